@@ -1,0 +1,1 @@
+"""Judges what the FMUs produced: co-simulation, trajectories on disk, reference solutions, findings, figures, report."""

@@ -1,0 +1,27 @@
+"""Findings: claims with the number that decides them."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+from typing import Any
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Finding:
+    """A claim, what was measured, what was expected and within which tolerance; nan never holds."""
+
+    claim: str
+    equation: str
+    measured: float
+    expected: float
+    tolerance: float
+    unit: str
+    source: str
+
+    @property
+    def holds(self) -> bool:
+        return abs(self.measured - self.expected) <= self.tolerance
+
+    def as_json(self) -> dict[str, Any]:
+        """All fields and the verdict."""
+        return {**asdict(self), "holds": self.holds}

@@ -1,0 +1,230 @@
+#!/usr/bin/env python3
+"""Build the FMUs, run a scenario, run the tests: `python3 build.py run | test | build | bench | clean`.
+
+Needs only a Python >= 3.11 with pip: it sets up `.venv` with pinned packages by itself, then goes on inside it.
+(This file shadows PyPA's `build` package in this folder; to make a wheel use `pip wheel .`)
+"""
+
+from __future__ import annotations
+
+import argparse
+import hashlib
+import json
+import os
+import shutil
+import subprocess
+import sys
+import tempfile
+import venv
+import zipfile
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parent
+ENVIRONMENT = ROOT / ".venv"
+STAMP = ENVIRONMENT / "installed.json"
+DIST = ROOT / "dist"
+PACKAGE = ROOT / "fmu_src"
+SYSTEM = PACKAGE / "system"
+
+# FMU (also the name of its class) -> the module that holds the class
+MODELS = {
+    "RoadExcitation": "road.road_excitation",
+    "Vehicle7DOF": "vehicle.vehicle7dof",
+    "LqrController": "controller.lqr_controller",
+}
+ENTRY = '''"""Slave script of {model}.fmu. The host may load the package of another version beside this one: hence the hash."""
+
+from {package}.{module} import {model} as _{model}
+
+
+class {model}(_{model}):
+    """{model}, content {identity}."""
+
+    identity = "{identity}"
+'''
+
+
+# ---------------------------------------------------------------------------------------------------- environment
+def environment_python() -> Path:
+    return ENVIRONMENT / ("Scripts/python.exe" if os.name == "nt" else "bin/python")
+
+
+def enter_environment(extras: list[str]) -> None:
+    """Set up `.venv` if it is missing or stale, then continue this very command inside it."""
+    sources = [ROOT / "pyproject.toml", ROOT / "constraints.txt"]
+    key = hashlib.sha256(b"".join(path.read_bytes() for path in sources)).hexdigest()
+    installed = json.loads(STAMP.read_text()) if STAMP.is_file() else {}
+    if installed.get("key") != key or not set(extras) <= set(installed["extras"]):
+        if Path(sys.prefix) == ENVIRONMENT:
+            sys.exit("pyproject.toml or constraints.txt have changed: call this command with the system's python3")
+        _install(sorted({*extras, *installed.get("extras", [])}))
+        STAMP.write_text(json.dumps({"key": key, "extras": sorted({*extras, *installed.get("extras", [])})}))
+    if Path(sys.prefix) != ENVIRONMENT:
+        command = [str(environment_python()), str(Path(__file__).resolve()), *sys.argv[1:]]
+        if os.name == "nt":
+            sys.exit(subprocess.call(command))
+        os.execv(command[0], command)
+
+
+def _install(extras: list[str]) -> None:
+    print("Setting up .venv with the pinned packages (once; about a minute) ...", file=sys.stderr, flush=True)
+    try:
+        venv.create(ENVIRONMENT, clear=True, with_pip=True)
+        pip = [str(environment_python()), "-m", "pip"]
+    except subprocess.CalledProcessError:  # Debian without python3-venv has no ensurepip; this Python's own pip will do
+        venv.create(ENVIRONMENT, clear=True, with_pip=False)
+        pip = [sys.executable, "-m", "pip", "--python", str(environment_python())]
+    project = f"{ROOT}[{','.join(extras)}]" if extras else str(ROOT)
+    command = [*pip, "install", "--disable-pip-version-check", "-c", str(ROOT / "constraints.txt"), "-e", project]
+    if not sys.stderr.isatty():
+        command.append("--quiet")
+    if subprocess.call(command):
+        shutil.rmtree(ENVIRONMENT, ignore_errors=True)
+        sys.exit("pip could not install the packages (see above): is there a network to a package index?")
+
+
+# ---------------------------------------------------------------------------------------------------- FMUs
+def build(quiet: bool = False) -> None:
+    """Build dist/*.fmu and dist/VehicleOnRoad.ssp, unless they are younger than their sources."""
+    fresh = _content_hash([PACKAGE, ROOT / "build.py", ROOT / "constraints.txt"])
+    stamp = DIST / "sources.sha256"
+    if stamp.is_file() and stamp.read_text() == fresh:
+        return
+    if not quiet:
+        print(f"Building the FMUs in {DIST} ...", file=sys.stderr, flush=True)
+    DIST.mkdir(exist_ok=True)
+    stamp.unlink(missing_ok=True)
+    for model in MODELS:
+        build_fmu(model, PACKAGE, DIST / f"{model}.fmu")
+    ssp = {"SystemStructure.ssd": SYSTEM / "SystemStructure.ssd"}
+    ssp |= {f"resources/{model}.fmu": DIST / f"{model}.fmu" for model in MODELS}
+    write_archive(DIST / "VehicleOnRoad.ssp", {name: path.read_bytes() for name, path in ssp.items()})
+    stamp.write_text(fresh)
+
+
+def build_fmu(model: str, package: Path, target: Path) -> None:
+    """Export one model of the package with pythonfmu; the same sources give the same bytes.
+
+    The package goes into the resources under a name that carries the hash of its content, with a slave script whose
+    name carries it too: a host process can then hold two versions.
+    """
+    from pythonfmu import FmuBuilder
+
+    identity = hashlib.sha256(f"{model} {_content_hash([package])}".encode()).hexdigest()[:32]
+    name = f"fmu_src_{identity[:12]}"
+    with tempfile.TemporaryDirectory(prefix="build_fmu_") as temporary:
+        folder = Path(temporary)
+        shutil.copytree(package, folder / name, ignore=shutil.ignore_patterns("__pycache__", "system"))
+        script = folder / f"{model.lower()}_{identity[:12]}.py"
+        script.write_text(ENTRY.format(model=model, module=MODELS[model], package=name, identity=identity))
+        files = [folder / name]
+        if model == "LqrController":
+            files.append(store_default_design(folder))
+        try:
+            made = FmuBuilder.build_FMU(script, folder / "made", project_files=files)
+        finally:
+            sys.path.remove(str(folder))  # left there by the builder
+        with zipfile.ZipFile(made) as archive:
+            contents = {entry: archive.read(entry) for entry in archive.namelist()}
+    write_archive(target, contents)
+
+
+def store_default_design(folder: Path) -> Path:
+    """Design the controller for the default parameters, so that the FMU as shipped needs no numeric library."""
+    from fmu_src.controller import design, halfcar
+
+    design.store(design.design(halfcar.HalfCar(), infinite=True, span=design.DEFAULT_SPAN), folder)
+    return folder / design.FILE_NAME
+
+
+def write_archive(target: Path, contents: dict[str, bytes]) -> None:
+    """A zip archive with sorted entries and fixed times, complete or not there at all."""
+    with tempfile.NamedTemporaryFile(dir=target.parent, suffix=".part", delete=False) as part:
+        with zipfile.ZipFile(part, "w", zipfile.ZIP_DEFLATED) as archive:
+            for name in sorted(contents):
+                entry = zipfile.ZipInfo(name, date_time=(1980, 1, 1, 0, 0, 0))
+                entry.compress_type, entry.external_attr = zipfile.ZIP_DEFLATED, 0o644 << 16
+                archive.writestr(entry, contents[name])
+    Path(part.name).chmod(0o644)
+    Path(part.name).replace(target)
+
+
+def _content_hash(paths: list[Path]) -> str:
+    digest = hashlib.sha256()
+    for path in paths:
+        for file in sorted(path.rglob("*")) if path.is_dir() else [path]:
+            if file.is_file() and "__pycache__" not in file.parts:
+                digest.update(file.relative_to(path.parent).as_posix().encode() + b"\0" + file.read_bytes() + b"\0")
+    return digest.hexdigest()
+
+
+# ---------------------------------------------------------------------------------------------------- commands
+def run(scenario: str, out: Path | None) -> int:
+    """Co-simulate a scenario, check it, and write the report."""
+    build()
+    where = ["-o", str(out)] if out else []
+    return subprocess.call([sys.executable, "-m", "analysis", "run", scenario, *where])
+
+
+def test(arguments: list[str]) -> int:
+    """Lint, types, import contracts, tests: all that the continuous integration runs."""
+    build()
+    checks = [
+        ["ruff", "check", "."],
+        ["ruff", "format", "--check", "."],
+        ["mypy"],
+        ["importlinter.cli", "lint-imports"],
+    ]
+    commands = [[sys.executable, "-m", *check] for check in checks[:3]]
+    commands.append([str(environment_python().with_name("lint-imports"))])
+    commands.append([sys.executable, "-m", "pytest", "-n", "auto", *arguments])
+    for command in commands:
+        print("$", *(Path(part).name for part in command), flush=True)
+        if status := subprocess.call(command, cwd=ROOT):
+            return status
+    return 0
+
+
+def bench() -> int:
+    """Time the default closed loop beside the alternatives."""
+    build()
+    return subprocess.call([sys.executable, str(ROOT / "benchmarks" / "closed_loop.py")])
+
+
+def clean() -> int:
+    """Remove what was built and installed here; run folders stay."""
+    caches = [".mypy_cache", ".ruff_cache", ".pytest_cache", ".hypothesis", ".import_linter_cache"]
+    for path in [DIST, ENVIRONMENT, *(ROOT / cache for cache in caches)]:
+        shutil.rmtree(path, ignore_errors=True)
+    return 0
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    verbs = parser.add_subparsers(dest="verb", required=True, metavar="VERB")
+    verb = verbs.add_parser("run", help="co-simulate a scenario, check it, write the report; default: the paper's bump")
+    verb.add_argument("scenario", nargs="?", default="bump", help="name of a built-in scenario, or a .toml file")
+    verb.add_argument("--out", type=Path, help="run folder (default: runs/SCENARIO)")
+    verb = verbs.add_parser("test", help="lint, types, import contracts, tests")
+    verb.add_argument("arguments", nargs=argparse.REMAINDER, help="handed on to pytest")
+    for name, what in (("build", "build dist/*.fmu and the .ssp"), ("bench", "benchmarks"), ("clean", "tidy up")):
+        verbs.add_parser(name, help=what)
+    options = parser.parse_args()
+
+    if options.verb == "clean":
+        return clean()
+    enter_environment(extras=["test"] if options.verb == "test" else [])
+    match options.verb:
+        case "run":
+            return run(options.scenario, options.out)
+        case "test":
+            return test(options.arguments)
+        case "bench":
+            return bench()
+        case _:
+            build()
+            return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

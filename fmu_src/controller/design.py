@@ -1,0 +1,100 @@
+"""A controller design as data: gains of u = K x for the infinite horizon and, by time to go, for the finite one.
+
+The design for the default parameters is made when the FMU is built and stored in its resources; reading it and
+looking up a gain take the standard library alone.
+"""
+
+from __future__ import annotations
+
+import json
+from bisect import bisect_right
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+from .halfcar import HalfCar
+
+Gain = tuple[float, ...]
+"""K (2 × 4), row after row."""
+
+FILE_NAME = "lqr_design.json"
+SPACING = 2.5e-3  # s; the cubic between two entries is then right to 2e-8 of the gain
+DEFAULT_SPAN = 2.5  # s of time to go that the stored table covers
+
+
+@dataclass(frozen=True, slots=True)
+class GainTable:
+    """K(s) and dK/ds at times to go s [s]; a cubic between them that has both."""
+
+    to_go: tuple[float, ...]
+    gains: tuple[Gain, ...]
+    slopes: tuple[Gain, ...]
+
+    def gain(self, s: float) -> Gain:
+        """K (2 × 4, row after row) at the time to go s; s is taken into the table's range."""
+        s = min(max(s, 0.0), self.to_go[-1])
+        i = min(bisect_right(self.to_go, s), len(self.to_go) - 1) - 1
+        h = self.to_go[i + 1] - self.to_go[i]
+        x = (s - self.to_go[i]) / h
+        y = 1.0 - x
+        f0, f1, d0, d1 = (1 + 2 * x) * y * y, (1 + 2 * y) * x * x, h * x * y * y, -h * x * x * y
+        columns = zip(self.gains[i], self.gains[i + 1], self.slopes[i], self.slopes[i + 1], strict=True)
+        return tuple(f0 * a + f1 * b + d0 * c + d1 * d for a, b, c, d in columns)
+
+
+@dataclass(frozen=True, slots=True)
+class Design:
+    """Gains for one half car; a part that was not asked for is None."""
+
+    car: HalfCar
+    infinite: Gain | None = None
+    finite: GainTable | None = None
+
+    def serves(self, car: HalfCar, horizon: str, span: float) -> bool:
+        """Whether this design holds the gains for this car, horizon and span [s] of time to go."""
+        if car != self.car:
+            return False
+        return self.infinite is not None if horizon == "infinite" else bool(self.finite and span <= self.finite.to_go[-1])
+
+
+def design(car: HalfCar, *, infinite: bool, span: float | None) -> Design:
+    """Solve the Riccati equations of this half car: algebraic if `infinite`, backward over `span` [s] if given.
+
+    Raises ImportError where numpy, scipy or (infinite horizon) control are missing.
+    """
+    import numpy as np
+
+    from .riccati import finite_horizon, infinite_horizon, riccati_rate
+
+    A, B, Q, R = (np.array(M) for M in (car.A, car.B, car.Q, car.R))
+    forever = tuple(infinite_horizon(A, B, Q, R)[1].ravel().tolist()) if infinite else None
+    table = None
+    if span is not None:
+        to_go = np.linspace(0.0, span, max(2, round(span / SPACING) + 1))
+        L = finite_horizon(A, B, Q, R, to_go)
+        slopes = np.array([riccati_rate(each, A, B, Q, R) for each in L])
+        K, dK = (-np.linalg.solve(R, B.T) @ each for each in (L, slopes))  # K = −R⁻¹ Bᵀ L
+        table = GainTable(
+            tuple(to_go.tolist()),
+            tuple(tuple(k.ravel().tolist()) for k in K),
+            tuple(tuple(k.ravel().tolist()) for k in dK),
+        )
+    return Design(car, forever, table)
+
+
+def store(made: Design, folder: Path) -> None:
+    """Write the design as JSON (numbers as repr, read back bit for bit)."""
+    (folder / FILE_NAME).write_text(json.dumps(asdict(made)), encoding="utf-8")
+
+
+def stored(folder: Path) -> Design | None:
+    """The design in this folder, if there is one."""
+    path = folder / FILE_NAME
+    if not path.is_file():
+        return None
+    data = json.loads(path.read_text(encoding="utf-8"))
+    table = data["finite"]
+    return Design(
+        HalfCar(**data["car"]),
+        tuple(data["infinite"]),
+        GainTable(tuple(table["to_go"]), tuple(map(tuple, table["gains"])), tuple(map(tuple, table["slopes"]))),
+    )
