@@ -32,15 +32,23 @@ MODELS = {
     "Vehicle7DOF": "vehicle.vehicle7dof",
     "LqrController": "controller.lqr_controller",
 }
-ENTRY = '''"""Slave script of {model}.fmu. The host may load the package of another version beside this one: hence the hash."""
+ENTRY = '''"""Slave script of {model}.fmu. The host may load another version of the package beside this one: hence the hash."""
 
 from {package}.{module} import {model} as _{model}
+
+_references = []
 
 
 class {model}(_{model}):
     """{model}, content {identity}."""
 
     identity = "{identity}"
+
+    def __init__(self, **kwargs):
+        # At each instantiation PythonFMU's loader gives up a reference to this module's dictionary which it never
+        # took; without this line the module is empty after a few instances.
+        _references.append(globals())
+        super().__init__(**kwargs)
 '''
 
 
@@ -169,18 +177,16 @@ def run(scenario: str, out: Path | None) -> int:
 def test(arguments: list[str]) -> int:
     """Lint, types, import contracts, tests: all that the continuous integration runs."""
     build()
-    checks = [
+    tools = environment_python().parent
+    for tool, *options in (
         ["ruff", "check", "."],
         ["ruff", "format", "--check", "."],
         ["mypy"],
-        ["importlinter.cli", "lint-imports"],
-    ]
-    commands = [[sys.executable, "-m", *check] for check in checks[:3]]
-    commands.append([str(environment_python().with_name("lint-imports"))])
-    commands.append([sys.executable, "-m", "pytest", "-n", "auto", *arguments])
-    for command in commands:
-        print("$", *(Path(part).name for part in command), flush=True)
-        if status := subprocess.call(command, cwd=ROOT):
+        ["lint-imports"],
+        ["pytest", "-n", "auto", *arguments],
+    ):
+        print("$", tool, *options, flush=True)
+        if status := subprocess.call([str(tools / tool), *options], cwd=ROOT):
             return status
     return 0
 
@@ -205,11 +211,12 @@ def main() -> int:
     verb = verbs.add_parser("run", help="co-simulate a scenario, check it, write the report; default: the paper's bump")
     verb.add_argument("scenario", nargs="?", default="bump", help="name of a built-in scenario, or a .toml file")
     verb.add_argument("--out", type=Path, help="run folder (default: runs/SCENARIO)")
-    verb = verbs.add_parser("test", help="lint, types, import contracts, tests")
-    verb.add_argument("arguments", nargs=argparse.REMAINDER, help="handed on to pytest")
+    verbs.add_parser("test", help="lint, types, import contracts, tests; further arguments go to pytest")
     for name, what in (("build", "build dist/*.fmu and the .ssp"), ("bench", "benchmarks"), ("clean", "tidy up")):
         verbs.add_parser(name, help=what)
-    options = parser.parse_args()
+    options, further = parser.parse_known_args()
+    if further and options.verb != "test":
+        parser.error(f"unrecognized arguments: {' '.join(further)}")
 
     if options.verb == "clean":
         return clean()
@@ -218,7 +225,7 @@ def main() -> int:
         case "run":
             return run(options.scenario, options.out)
         case "test":
-            return test(options.arguments)
+            return test(further)
         case "bench":
             return bench()
         case _:

@@ -1,0 +1,226 @@
+"""The master: co-simulates the FMUs of a system with a fixed communication step, Gauss–Seidel or Jacobi.
+
+Communication points are t_n = t_0 + n·H, never a running sum; a stop time that is no multiple is met by a short last
+step. All numbers live in one table (`layout`): per step and FMU there is one setReal, one doStep and one getReal, by
+pointer, and the table is the recording.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import platform
+import signal
+import tempfile
+import threading
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+import fmpy
+import numpy as np
+from tqdm import tqdm
+
+from .component import WARNING, Component
+from .errors import InputError
+from .layout import lay_out
+from .scenario import Scenario
+from .trajectory import Array, Run, Trajectory
+from .wiring import Port, Wiring, read_wiring
+
+DEFAULT_SYSTEM = Path(__file__).resolve().parents[1] / "dist" / "VehicleOnRoad.ssp"
+CHUNK = 64  # steps between two looks at the progress bar and at Ctrl-C
+DOUBLE = 8  # bytes
+
+
+def simulate(scenario: Scenario, system: Path = DEFAULT_SYSTEM, *, progress: bool = False) -> Run:
+    """Co-simulate a scenario on the system in an .ssp file; everything that was unpacked is removed afterwards.
+
+    Raises InputError for a system or a variable that is not there, CosimError, with the FMU's own words, where an FMU
+    refuses. A progress bar appears on a terminal if asked for.
+    """
+    if not system.is_file():
+        raise InputError(f"{system}: no such file; build it with: python3 build.py build")
+    with contextlib.ExitStack() as stack:
+        folder = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="cosimulation_")))
+        wiring, components = _load(system, folder, stack)
+        _initialize(components, scenario)
+        parameters = {name: c.parameters() for name, c in components.items()}
+        trajectory = _Table(components, wiring, scenario).fill(progress)
+    record = {
+        "format": 1,
+        "scenario": scenario.as_json(),
+        "parameters": parameters,
+        "fmus": {
+            name: {"file": Path(wiring.sources[name]).name, "sha256": c.sha256, "guid": c.guid}
+            for name, c in components.items()
+        },
+        "versions": {
+            "python": platform.python_version(),
+            **{package: version(package) for package in ("bertolino-baksa", "pythonfmu", "fmpy", "numpy")},
+        },
+        "method": f"{scenario.coupling}, fixed step {scenario.step!r} s",
+    }
+    return Run(trajectory=trajectory, record=record)
+
+
+def _load(system: Path, folder: Path, stack: contextlib.ExitStack) -> tuple[Wiring, dict[str, Component]]:
+    """Unpack the system into the folder and instantiate its components; the stack frees them."""
+    try:
+        fmpy.extract(system, folder)
+    except Exception as error:  # fmpy raises bare Exceptions; zipfile its own
+        raise InputError(f"{system}: cannot be unpacked: {error}") from error
+    wiring = read_wiring(folder / "SystemStructure.ssd")
+    components = {}
+    for name, source in wiring.sources.items():
+        component = Component(name, folder / source, folder / "unpacked" / name)
+        stack.callback(component.free)
+        components[name] = component
+    return wiring, components
+
+
+def _initialize(components: dict[str, Component], scenario: Scenario) -> None:
+    """Parameters, start values, start time; all components enter initialization mode."""
+    for c in components.values():
+        c.call(c.fmu.setupExperiment, startTime=scenario.start_time, stopTime=scenario.stop_time)
+        c.set_parameters(scenario.parameters)
+        if set(scenario.start) & set(c.named("output")):
+            c.set_parameters(dict(scenario.start))
+        c.call(c.fmu.enterInitializationMode)
+
+
+@dataclass(frozen=True, slots=True)
+class _Stage:
+    """What one component needs within a step, ready for direct calls; addresses are those of the first new row."""
+
+    component: Component
+    inputs: Any  # C arrays of value references
+    outputs: Any
+    input_address: int
+    output_address: int
+    gathered: tuple[Array, Array] | None  # where the inputs are no stretch: a buffer for them, and their positions
+
+
+class _Table:
+    """The rows of one run, and the loop that fills them."""
+
+    def __init__(self, components: dict[str, Component], wiring: Wiring, scenario: Scenario) -> None:
+        self.components, self.scenario = components, scenario
+        self.outputs = {name: c.named("output") for name, c in components.items()}
+        self.recorded = self._recorded(scenario.record)
+        self.inputs = {name: [p.variable for p in wiring.feeds if p.component == name] for name in components}
+        feeds = {name: [wiring.feeds[Port(name, v)] for v in inputs] for name, inputs in self.inputs.items()}
+        self.layout = lay_out(self.outputs, feeds, list(components), scenario.coupling)
+        span = scenario.stop_time - scenario.start_time
+        self.whole = int(span / scenario.step * (1 + 1e-12))  # steps of full length
+        self.rest = span - self.whole * scenario.step
+        if self.rest <= 1e-9 * scenario.step:
+            self.rest = 0.0
+        self.rows = np.zeros((1 + self.whole + (self.rest > 0.0), self.layout.width))
+
+    def _recorded(self, wanted: Sequence[str]) -> list[Port]:
+        """The variables to record; those that are no outputs join the list that is read from their component."""
+        if not wanted:
+            return [Port(name, variable) for name, variables in self.outputs.items() for variable in variables]
+        found = []
+        for variable in wanted:
+            owners = [name for name, variables in self.outputs.items() if variable in variables]
+            owners += [name for name, c in self.components.items() if c.has_real(variable)]
+            if not owners:
+                known = ", ".join(v for variables in self.outputs.values() for v in variables)
+                raise InputError(f"record: no component has a real variable {variable!r}; outputs are: {known}")
+            if variable not in self.outputs[owners[0]]:
+                self.outputs[owners[0]].append(variable)
+            found.append(Port(owners[0], variable))
+        return found
+
+    def fill(self, progress: bool) -> Trajectory:
+        """Run from start to stop."""
+        s = self.scenario
+        self._first_row()
+        stages = [self._stage(name) for name in self.components]
+        bar = tqdm(total=len(self.rows) - 1, unit=" steps", desc=s.name, disable=None if progress else True, leave=False)
+        with _deferred_interrupt() as interrupted, bar:
+            for first in range(0, self.whole, CHUNK):
+                last = min(first + CHUNK, self.whole)
+                _advance(stages, range(first, last), s.start_time, s.step, s.step, self.rows)
+                bar.update(last - first)
+                if interrupted.is_set():
+                    raise KeyboardInterrupt
+            if self.rest:
+                _advance(stages, range(self.whole, self.whole + 1), s.start_time, s.step, self.rest, self.rows)
+        time = s.start_time + s.step * np.arange(len(self.rows))
+        if self.rest:
+            time[-1] = s.stop_time
+        columns = [self.layout.columns[port] for port in self.recorded]
+        names = tuple(port.variable for port in self.recorded)
+        return Trajectory(time=time, names=names, values=self.rows[:, columns])
+
+    def _first_row(self) -> None:
+        """Values at the start: twice around, so that the controller's forces reach the car's accelerations."""
+        for _ in range(2):
+            for name, c in self.components.items():
+                if self.inputs[name]:
+                    sources = [position % self.layout.width for position in self.layout.inputs[name]]
+                    c.call(c.fmu.setReal, list(c.references(self.inputs[name])), self.rows[0, sources].tolist())
+                self._read_first(name, c)
+        for name, c in self.components.items():
+            c.call(c.fmu.exitInitializationMode)
+            self._read_first(name, c)
+
+    def _read_first(self, name: str, c: Component) -> None:
+        columns = [self.layout.columns[Port(name, v)] for v in self.outputs[name]]
+        self.rows[0, columns] = c.fmu.getReal(list(c.references(self.outputs[name])))
+
+    def _stage(self, name: str) -> _Stage:
+        c, layout = self.components[name], self.layout
+        positions = layout.inputs[name]
+        new_row = self.rows.ctypes.data + layout.width * DOUBLE
+        gathered = None
+        if positions and not layout.stretch(name):
+            gathered = np.empty(len(positions)), np.array(positions) + layout.width
+        return _Stage(
+            component=c,
+            inputs=c.references(self.inputs[name]),
+            outputs=c.references(self.outputs[name]),
+            input_address=new_row + positions[0] * DOUBLE if positions else 0,
+            output_address=new_row + layout.columns[Port(name, self.outputs[name][0])] * DOUBLE,
+            gathered=gathered,
+        )
+
+
+def _advance(stages: list[_Stage], steps: range, start: float, step: float, length: float, rows: Array) -> None:
+    """Make the steps k from t = start + k·step, each of this length [s]: per component set inputs, step, get outputs."""
+    width = rows.shape[1]
+    flat, stride = rows.reshape(-1), width * DOUBLE
+    calls = [(s, s.component, s.component.pointer, len(s.inputs), len(s.outputs)) for s in stages]
+    for k in steps:
+        t, offset = start + k * step, k * stride
+        for stage, c, pointer, n_in, n_out in calls:
+            if n_in:
+                address = stage.input_address + offset
+                if stage.gathered is not None:
+                    buffer, positions = stage.gathered
+                    np.take(flat, positions + k * width, out=buffer)
+                    address = buffer.ctypes.data
+                if (status := c.set_real(pointer, stage.inputs, n_in, address)) > WARNING:
+                    c.fail("setting inputs", t, status)
+            if (status := c.do_step(pointer, t, length, 1)) > WARNING:
+                c.fail(f"step of {length:g} s", t, status)
+            if (status := c.get_real(pointer, stage.outputs, n_out, stage.output_address + offset)) > WARNING:
+                c.fail("reading outputs", t, status)
+
+
+@contextlib.contextmanager
+def _deferred_interrupt() -> Iterator[threading.Event]:
+    """Ctrl-C sets the event instead of raising inside the Python code of an FMU, which would take it for a failure."""
+    interrupted = threading.Event()
+    if threading.current_thread() is not threading.main_thread():
+        yield interrupted
+        return
+    previous = signal.signal(signal.SIGINT, lambda *_: interrupted.set())
+    try:
+        yield interrupted
+    finally:
+        signal.signal(signal.SIGINT, previous)

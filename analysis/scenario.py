@@ -1,0 +1,231 @@
+"""Scenarios: what to simulate, read from TOML (or from the run.json of an earlier run) and checked in full.
+
+    title = "…"
+    [simulation]   start_time, stop_time, step [s]; coupling = "gauss-seidel" | "jacobi"; record = ["body.heave", …]
+    [parameters]   any parameter of the FMUs; each goes to every FMU that has it
+    [start]        start values of the car's states, "body.heave" = 0.01, …
+
+A real value is a number in SI units, or a string with its unit: "36 km/h", "20 ms", "1 deg".
+"""
+
+from __future__ import annotations
+
+import math
+import re
+import tomllib
+from collections.abc import Iterable
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Any
+
+from fmu_src.controller.lqr_controller import LqrController
+from fmu_src.quantities import PARAMETERS, STATES, Choice, Quantity
+from fmu_src.road.road_excitation import RoadExcitation
+from fmu_src.vehicle.vehicle7dof import Vehicle7DOF
+
+from .errors import InputError
+from .trajectory import read_record
+
+BUILT_IN = Path(__file__).resolve().parents[1] / "fmu_src" / "system" / "scenarios"
+MAX_STEPS = 10_000_000  # of a run; more is a mistyped step rather than a wish
+
+_COMPONENTS = (RoadExcitation, Vehicle7DOF, LqrController)
+_REALS = {name: PARAMETERS[name] for c in _COMPONENTS for name in c.reals}
+_CHOICES = {choice.name: choice for c in _COMPONENTS for choice in c.choices}
+_SWITCHES = {name for c in _COMPONENTS for name in c.switches}
+_START = {q.name: q for q in STATES}
+_COUPLING = Choice(name="coupling", values=("gauss-seidel", "jacobi"), text="order of exchange between the FMUs")
+_TIMES = {
+    "start_time": Quantity(name="start_time", unit="s", symbol="t_0", text="start of the simulation"),
+    "stop_time": Quantity(name="stop_time", unit="s", symbol="t_1", text="end of the simulation", start=5.0),
+    "step": Quantity(name="step", unit="s", symbol="H", text="communication step", start=1e-3, positive=True),
+}
+_KEYS: dict[str, Iterable[str]] = {
+    "": ("title", "simulation", "parameters", "start"),
+    "simulation": (*_TIMES, "coupling", "record"),
+    "parameters": (*_REALS, *_CHOICES, *_SWITCHES),
+    "start": _START,
+}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Scenario:
+    """A simulation to run; SI units. `record` empty: all outputs of all components."""
+
+    name: str
+    title: str = ""
+    start_time: float = 0.0
+    stop_time: float = 5.0
+    step: float = 1e-3
+    coupling: str = "gauss-seidel"
+    record: tuple[str, ...] = ()
+    parameters: dict[str, float | str | bool] = field(default_factory=dict)
+    start: dict[str, float] = field(default_factory=dict)
+
+    def as_json(self) -> dict[str, Any]:
+        return asdict(self)
+
+
+def built_in_scenarios() -> list[str]:
+    """Names of the scenarios that come with the project."""
+    return sorted(path.stem for path in BUILT_IN.glob("*.toml"))
+
+
+def read_scenario(name_or_path: str) -> Scenario:
+    """A built-in scenario by name, a .toml file, or the run.json of an earlier run.
+
+    Raises InputError with all faults, each with file, line, what was wanted and what was got.
+    """
+    path = BUILT_IN / f"{name_or_path}.toml"
+    if name_or_path not in built_in_scenarios():
+        path = Path(name_or_path)
+    if path.suffix == ".json":
+        return _checked(read_record(path)["scenario"], path, "", flat=True)
+    try:
+        text = path.read_text(encoding="utf-8")
+        return _checked(tomllib.loads(text), path, text, flat=False)
+    except FileNotFoundError:
+        known = ", ".join(built_in_scenarios())
+        raise InputError(f"{name_or_path}: no such file, and no built-in scenario; known are: {known}") from None
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputError(f"{path}: cannot be read: {error}") from error
+    except (tomllib.TOMLDecodeError, RecursionError) as error:
+        raise InputError(f"{path}: not TOML: {error}") from error
+
+
+def _checked(data: Any, path: Path, text: str, *, flat: bool) -> Scenario:
+    """A Scenario from plain data; `flat`: the layout of run.json, where the simulation's keys stand at the top."""
+    check = _Check(path, text)
+    if flat:
+        rest = {key: data[key] for key in ("title", "parameters", "start") if key in data}
+        data = {**rest, "simulation": {key: data[key] for key in _KEYS["simulation"] if key in data}}
+    sections = {key: check.table(data, key) for key in ("simulation", "parameters", "start")}
+    for section, known in _KEYS.items():
+        check.keys(section, sections.get(section, data), known)
+    simulation = sections["simulation"]
+    times = {key: check.real("simulation", q, simulation.get(key, q.start)) for key, q in _TIMES.items()}
+    parameters = {key: check.parameter(key, value) for key, value in sections["parameters"].items()}
+    coupling = check.choice("simulation", _COUPLING, simulation.get("coupling", _COUPLING.start))
+    if coupling == "gauss-seidel":  # the road is stepped before the car
+        parameters.setdefault("road_sampling", "end")
+    scenario = Scenario(
+        name=path.stem if not flat else path.parent.name,
+        title=check.string("", "title", data.get("title", path.stem)),
+        coupling=coupling,
+        record=check.record(simulation.get("record", [])),
+        parameters=parameters,
+        start={key: check.real("start", _START[key], v) for key, v in sections["start"].items() if key in _START},
+        **times,
+    )
+    check.span(scenario)
+    check.conclude()
+    return scenario
+
+
+class _Check:
+    """Collects the faults of one file, each with its line."""
+
+    def __init__(self, path: Path, text: str) -> None:
+        self.path, self.lines, self.faults = path, text.splitlines(), list[str]()
+
+    def fault(self, section: str, key: str, what: str) -> None:
+        line = _line_of(self.lines, section, key)
+        self.faults.append(f"{self.path}{f':{line}' if line else ''}: {what}")
+
+    def conclude(self) -> None:
+        if self.faults:
+            raise InputError("\n".join(self.faults))
+
+    def table(self, data: Any, key: str) -> dict[str, Any]:
+        value = data.get(key, {})
+        if not isinstance(value, dict):
+            self.fault("", key, f"{key}: wanted a table [{key}], got {value!r}")
+            return {}
+        return value
+
+    def keys(self, section: str, table: dict[str, Any], known: Iterable[str]) -> None:
+        for key in table.keys() - set(known):
+            where = f"in [{section}]" if section else "at the top level"
+            self.fault(section, key, f"unknown key {key!r} {where}; known are: {', '.join(known)}")
+
+    def string(self, section: str, key: str, value: Any) -> str:
+        if not isinstance(value, str):
+            self.fault(section, key, f"{key} = {value!r}: wanted a string")
+        return str(value)
+
+    def choice(self, section: str, choice: Choice, value: Any) -> str:
+        if fault := choice.fault(value):
+            self.fault(section, choice.name, fault)
+        return str(value)
+
+    def real(self, section: str, q: Quantity, value: Any) -> float:
+        try:
+            number = _in_si(value, q.unit)
+        except ValueError as error:
+            self.fault(section, q.name, f"{q.name} = {value!r}: wanted {q.text} in {q.unit} (a number, or a string like "
+                       f"'{q.start:g} {q.unit}'), {error}")
+            return q.start
+        if fault := q.fault(number):
+            self.fault(section, q.name, fault)
+        return number
+
+    def parameter(self, key: str, value: Any) -> float | str | bool:
+        if key in _REALS:
+            return self.real("parameters", _REALS[key], value)
+        if key in _CHOICES:
+            return self.choice("parameters", _CHOICES[key], value)
+        if key in _SWITCHES and not isinstance(value, bool):
+            self.fault("parameters", key, f"{key} = {value!r}: wanted true or false")
+        return bool(value)
+
+    def record(self, value: Any) -> tuple[str, ...]:
+        if not (isinstance(value, list | tuple) and all(isinstance(name, str) for name in value)):
+            self.fault("simulation", "record", f"record = {value!r}: wanted a list of variable names")
+            return ()
+        return tuple(value)
+
+    def span(self, s: Scenario) -> None:
+        if not s.stop_time > s.start_time:
+            self.fault("simulation", "stop_time", f"stop_time = {s.stop_time!r} s: wanted more than start_time = {s.start_time!r} s")
+        elif (s.stop_time - s.start_time) / s.step > MAX_STEPS:
+            self.fault("simulation", "step", f"step = {s.step!r} s: wanted at most {MAX_STEPS} steps to stop_time = {s.stop_time!r} s")
+
+
+def _in_si(value: Any, unit: str) -> float:
+    """A number in the given SI unit, from a number or a string with a unit. Raises ValueError saying what was got."""
+    if isinstance(value, bool) or not isinstance(value, int | float | str):
+        raise ValueError(f"got {type(value).__name__}")
+    if not isinstance(value, str):
+        return float(value)
+    match = re.fullmatch(r"\s*([-+]?[\d.]+(?:[eE][-+]?\d+)?)\s*([^\d\s.][^\n]{0,40})", value)
+    if not match:
+        raise ValueError("got a string that is not a number with a unit")
+    import pint  # takes a moment to import, and most scenarios are in SI numbers
+
+    registry = pint.get_application_registry()
+    try:
+        got = registry.parse_units(match[2].strip())
+        factor = registry.Quantity(float(match[1]), got).to(_pint_unit(unit)).magnitude
+    except (pint.errors.PintError, ValueError, TypeError, AttributeError, KeyError) as error:
+        raise ValueError(f"got the unit {match[2].strip()!r}: {error}") from error
+    return float(factor) if math.isfinite(factor) else math.nan
+
+
+def _pint_unit(unit: str) -> str:
+    """An FMI unit such as N.s/m or kg.m2 as pint writes it."""
+    return re.sub(r"([a-zA-Z]+)(\d+)", r"\1**\2", unit.replace(".", "*"))
+
+
+def _line_of(lines: list[str], section: str, key: str) -> int | None:
+    """Line (from 1) on which a key of a section is set, or on which the section begins."""
+    current = ""
+    for number, line in enumerate(lines, start=1):
+        if header := re.match(r"\s*\[\s*([\w.-]+)\s*\]", line):
+            current = header[1]
+            if not section and current == key:
+                return number
+        elif re.match(rf"""\s*["']?{re.escape(key)}["']?\s*=""", line) and current == section:
+            return number
+        elif section and not current and re.match(rf"""\s*{section}\s*(\.\s*["']?{re.escape(key)}["']?\s*)?=""", line):
+            return number
+    return None
