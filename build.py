@@ -32,7 +32,7 @@ MODELS = {
     "Vehicle7DOF": "vehicle.vehicle7dof",
     "LqrController": "controller.lqr_controller",
 }
-ENTRY = '''"""Slave script of {model}.fmu. The host may load another version of the package beside this one: hence the hash."""
+ENTRY = '''"""Slave script of {model}.fmu; the hash in names keeps it apart from other versions in the same host process."""
 
 from {package}.{module} import {model} as _{model}
 
@@ -147,14 +147,14 @@ def store_default_design(folder: Path) -> Path:
 
 def write_archive(target: Path, contents: dict[str, bytes]) -> None:
     """A zip archive with sorted entries and fixed times, complete or not there at all."""
-    with tempfile.NamedTemporaryFile(dir=target.parent, suffix=".part", delete=False) as part:
+    with tempfile.TemporaryDirectory(dir=target.parent, prefix=".build_") as folder:
+        part = Path(folder) / target.name
         with zipfile.ZipFile(part, "w", zipfile.ZIP_DEFLATED) as archive:
             for name in sorted(contents):
                 entry = zipfile.ZipInfo(name, date_time=(1980, 1, 1, 0, 0, 0))
                 entry.compress_type, entry.external_attr = zipfile.ZIP_DEFLATED, 0o644 << 16
                 archive.writestr(entry, contents[name])
-    Path(part.name).chmod(0o644)
-    Path(part.name).replace(target)
+        part.replace(target)
 
 
 def _content_hash(paths: list[Path]) -> str:

@@ -1,1 +1,1 @@
-"""Judges what the FMUs produced: co-simulation, trajectories on disk, reference solutions, findings, figures, report."""
+"""Judges what the FMUs produce: co-simulation, trajectories on disk, references, findings, figures, report."""

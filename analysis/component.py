@@ -93,7 +93,9 @@ class Component:
         for v in self.variables.values():
             if v.causality == "parameter":
                 (value,) = getters[v.type]([v.valueReference])
-                found[v.name] = value.decode() if isinstance(value, bytes) else bool(value) if v.type == "Boolean" else value
+                found[v.name] = (
+                    value.decode() if isinstance(value, bytes) else bool(value) if v.type == "Boolean" else value
+                )
         return found
 
     def call(self, function: Callable[..., Any], *arguments: Any, **keywords: Any) -> None:

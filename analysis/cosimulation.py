@@ -140,17 +140,19 @@ class _Table:
         s = self.scenario
         self._first_row()
         stages = [self._stage(name) for name in self.components]
-        bar = tqdm(total=len(self.rows) - 1, unit=" steps", desc=s.name, disable=None if progress else True, leave=False)
-        with _deferred_interrupt() as interrupted, bar:
+        bar = tqdm(
+            total=len(self.rows) - 1, unit=" steps", desc=s.name, disable=None if progress else True, leave=False
+        )
+        with _deferred_signals() as caught, bar:
             for first in range(0, self.whole, CHUNK):
                 last = min(first + CHUNK, self.whole)
                 _advance(stages, range(first, last), s.start_time, s.step, s.step, self.rows)
                 bar.update(last - first)
-                if interrupted.is_set():
-                    raise KeyboardInterrupt
-            if self.rest:
+                if caught:
+                    break
+            if self.rest and not caught:
                 _advance(stages, range(self.whole, self.whole + 1), s.start_time, s.step, self.rest, self.rows)
-        time = s.start_time + s.step * np.arange(len(self.rows))
+        time = s.start_time + s.step * np.arange(len(self.rows), dtype=np.float64)
         if self.rest:
             time[-1] = s.stop_time
         columns = [self.layout.columns[port] for port in self.recorded]
@@ -191,7 +193,7 @@ class _Table:
 
 
 def _advance(stages: list[_Stage], steps: range, start: float, step: float, length: float, rows: Array) -> None:
-    """Make the steps k from t = start + k·step, each of this length [s]: per component set inputs, step, get outputs."""
+    """Make the steps k from t = start + k·step, of this length [s]: for each component set inputs, step, get outputs."""
     width = rows.shape[1]
     flat, stride = rows.reshape(-1), width * DOUBLE
     calls = [(s, s.component, s.component.pointer, len(s.inputs), len(s.outputs)) for s in stages]
@@ -213,14 +215,21 @@ def _advance(stages: list[_Stage], steps: range, start: float, step: float, leng
 
 
 @contextlib.contextmanager
-def _deferred_interrupt() -> Iterator[threading.Event]:
-    """Ctrl-C sets the event instead of raising inside the Python code of an FMU, which would take it for a failure."""
-    interrupted = threading.Event()
+def _deferred_signals() -> Iterator[list[int]]:
+    """Ctrl-C and SIGTERM are noted in the list and take effect on leaving.
+
+    Raised at once, they would strike inside the Python code of an FMU, which would take them for its own failure.
+    """
+    caught: list[int] = []
     if threading.current_thread() is not threading.main_thread():
-        yield interrupted
+        yield caught
         return
-    previous = signal.signal(signal.SIGINT, lambda *_: interrupted.set())
+    signals = (signal.SIGINT, signal.SIGTERM)
+    previous = [signal.signal(number, lambda got, _: caught.append(got)) for number in signals]
     try:
-        yield interrupted
+        yield caught
     finally:
-        signal.signal(signal.SIGINT, previous)
+        for number, handler in zip(signals, previous, strict=True):
+            signal.signal(number, handler)
+        if caught:
+            signal.raise_signal(caught[0])

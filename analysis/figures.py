@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import io
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -25,6 +25,7 @@ from .trajectory import Array, Run, Trajectory
 
 Axes = Any  # of matplotlib, whose types are not looked at here
 Panel = Callable[[Axes], Axes]
+Window = tuple[float, float]
 FOLDER = "figures"
 READING = {
     "m": ("mm", 1e3),
@@ -56,6 +57,7 @@ STYLE = {
     "svg.hashsalt": "bertolino-baksa",  # else the ids in the file are new each time
 }
 WIDTH, PANEL_HEIGHT = 7.2, 2.5  # inches
+COLUMNS = 2000  # of a panel, finer than the eye or a printer
 G = 9.81  # m/s2
 
 Z, PSI, PHI, Z11, Z12, Z2, PSI2 = POSITIONS
@@ -80,6 +82,7 @@ class Subject:
     panels: Sequence[Panel]
     sources: Sequence[Trajectory]
     needs: Sequence[Quantity]
+    window: Callable[[], Window] | None = None  # of time [s]; by default the eventful one
 
     @property
     def missing(self) -> list[str]:
@@ -88,13 +91,18 @@ class Subject:
 
 
 # ------------------------------------------------------------------ numbers that figures and report share
-def numbers(run: Run, *names: str) -> list[float]:
+def real_parameters(run: Run, *names: str) -> list[float]:
     """Real parameters of the run, SI units. Raises InputError naming those that its record lacks."""
     known = run.parameters
     lacking = [name for name in names if not isinstance(known.get(name), (int, float))]
     if lacking:
         raise InputError(f"run.json: parameters: wanted a number for {', '.join(lacking)}, got none")
     return [float(known[name]) for name in names]
+
+
+def readable(value: float, digits: int = 4) -> str:
+    """A measured value to so many digits, with a true minus sign."""
+    return f"{value:.{digits}g}".replace("-", "−")
 
 
 def is_controlled(run: Run) -> bool:
@@ -104,7 +112,7 @@ def is_controlled(run: Run) -> bool:
 
 def static_loads(run: Run) -> Array:
     """Loads (4) [N] of the tyres fl, fr, rl, rr of the car at rest: its share of the body, its wheel, half the beam."""
-    m, m11, m12, m21, m22, m2, a, b = numbers(run, "m", "m11", "m12", "m21", "m22", "m2", "a", "b")
+    m, m11, m12, m21, m22, m2, a, b = real_parameters(run, "m", "m11", "m12", "m21", "m22", "m2", "a", "b")
     front, rear = m * b / (2 * (a + b)), m * a / (2 * (a + b)) + m2 / 2
     return G * np.array([front + m11, front + m12, rear + m21, rear + m22])
 
@@ -112,6 +120,35 @@ def static_loads(run: Run) -> Array:
 def tyre_loads(run: Run) -> Array:
     """Total vertical loads (n, 4) [N] of the tyres: static load and exported tyre force."""
     return static_loads(run) + run.trajectory.columns([q.name for q in TYRE_FORCES])
+
+
+# ------------------------------------------------------------------ what part of the time axis is worth its width
+def uneven(trajectory: Trajectory, wave: float) -> Window:
+    """Times [s] between which the road changes, a quarter added; of an endless road four waves of `wave` [s] each."""
+    time = trajectory.time
+    changes = np.diff(trajectory.columns([q.name for q in ROAD_HEIGHTS]), axis=0) != 0.0
+    rows = np.flatnonzero(changes.any(axis=1))
+    if not rows.size:
+        return float(time[0]), float(time[-1])
+    first, last = time[rows[0]], time[rows[-1] + 1]
+    if last == time[-1]:
+        met_last = max(time[np.argmax(wheel)] for wheel in changes.T if wheel.any())
+        last = min(last, met_last + 4.0 * wave)
+    margin = 0.25 * (last - first)
+    return float(max(time[0], first - margin)), float(min(time[-1], last + margin))
+
+
+def eventful(sources: Sequence[Trajectory], quantities: Sequence[Quantity]) -> Window:
+    """Times [s] from the start until all is within 1 % of where it ends, a quarter added."""
+    names = [q.name for q in quantities]
+    return min(t.time[0] for t in sources), max(_settled(t.time, t.columns(names)) for t in sources)
+
+
+def _settled(time: Array, values: Array) -> float:
+    away = np.abs(values - values[-1])
+    rows = np.flatnonzero((away > 0.01 * away.max(axis=0)).any(axis=1))
+    end = time[0] + 1.25 * (time[rows[-1] + 1] - time[0]) if rows.size else time[-1]
+    return float(min(end, time[-1]))
 
 
 # ------------------------------------------------------------------ plotting functions
@@ -125,11 +162,11 @@ def axis_label(quantities: Sequence[Quantity], unit: str) -> str:
     return ", ".join(f"${q.symbol}$" for q in quantities) + f" [{unit}]"
 
 
-def plot_quantities(trajectory: Trajectory, quantities: Sequence[Quantity], ax: Axes, **line: Any) -> Axes:
+def plot_quantities(trajectory: Trajectory, quantities: Sequence[Quantity], ax: Axes) -> Axes:
     """Quantities of one unit against time, with a legend above the panel."""
     unit, factor = READING[quantities[0].unit]
     for q in quantities:
-        ax.plot(trajectory.time, factor * trajectory[q.name], label=f"${q.symbol}$ {words(q)}", **line)
+        ax.plot(trajectory.time, factor * trajectory[q.name], label=f"${q.symbol}$ {words(q)}")
     ax.set_ylabel(axis_label(quantities, unit))
     return finish(ax)
 
@@ -141,35 +178,11 @@ def finish(ax: Axes) -> Axes:
     return ax
 
 
-def plot_excitations(trajectory: Trajectory, wave: float, ax: Axes) -> Axes:
-    """Road heights under the wheels while they change; of an endless road four waves, each `wave` long [s]."""
-    plot_quantities(trajectory, ROAD_HEIGHTS, ax)
-    window = uneven(trajectory, wave)
-    if window:
-        ax.set_xlim(*window)
-    return ax
-
-
-def uneven(trajectory: Trajectory, wave: float) -> tuple[float, float] | None:
-    """Times [s] between which the road is worth a look, with a margin; None if it is flat throughout."""
-    time = trajectory.time
-    changes = np.diff(trajectory.columns([q.name for q in ROAD_HEIGHTS]), axis=0) != 0.0
-    rows = np.flatnonzero(changes.any(axis=1))
-    if not rows.size:
-        return None
-    first, last = time[rows[0]], time[rows[-1] + 1]
-    if last == time[-1]:
-        met_last = max(time[np.argmax(wheel)] for wheel in changes.T if wheel.any())
-        last = min(last, met_last + 4.0 * wave)
-    margin = 0.25 * (last - first)
-    return float(max(time[0], first - margin)), float(min(time[-1], last + margin))
-
-
 def plot_heaves(trajectory: Trajectory, ax: Axes) -> Axes:
     """Body and rear axle heave over the lightly drawn front wheels."""
     unit, factor = READING[Z.unit]
     for q, color, width in ((Z11, "#88bbdd", 0.8), (Z12, "#f7b98c", 0.8), (Z2, TEAL, 1.3), (Z, "#222222", 1.6)):
-        label = f"${q.symbol}$ {words(q)}"
+        label = f"${q.symbol}$ {words(q).removesuffix(' heave')}"
         ax.plot(trajectory.time, factor * trajectory[q.name], color=color, linestyle="-", linewidth=width, label=label)
     ax.set_ylabel(axis_label((Z, Z2, Z11, Z12), unit))
     return finish(ax)
@@ -178,19 +191,21 @@ def plot_heaves(trajectory: Trajectory, ax: Axes) -> Axes:
 def plot_comparison(controlled: Trajectory, uncontrolled: Trajectory, q: Quantity, ax: Axes) -> Axes:
     """One quantity with (red) and without (blue, dashed) control forces."""
     unit, factor = READING[q.unit]
-    ax.plot(controlled.time, factor * controlled[q.name], color=RED, linestyle="-", label="optimal stabilization")
-    ax.plot(
-        uncontrolled.time, factor * uncontrolled[q.name], color=BLUE, linestyle=DASHED, label="without control forces"
-    )
+    for trajectory, color, dashes, how in (
+        (controlled, RED, "-", "optimal stabilization"),
+        (uncontrolled, BLUE, DASHED, "without control forces"),
+    ):
+        values = factor * trajectory[q.name]
+        ax.plot(trajectory.time, values, color=color, linestyle=dashes, label=f"{words(q)}, {how}")
     ax.set_ylabel(axis_label((q,), unit))
     return finish(ax)
 
 
 def plot_tyre_loads(time: Array, loads: Array, quantities: Sequence[Quantity], ax: Axes) -> Axes:
     """Total loads (n, k) [N] of k tyres, and the line below which they would have left the ground."""
-    ax.axhline(0.0, color=RED, linestyle="-", linewidth=1.0, label="no load: contact is lost below")
     for q, load in zip(quantities, loads.T, strict=True):
-        ax.plot(time, 1e-3 * load, label=f"{words(q)}")
+        ax.plot(time, 1e-3 * load, label=words(q))
+    ax.axhline(0.0, color=RED, linestyle="-", linewidth=1.0, label="no load, contact is lost below")
     ax.set_ylabel("static + " + axis_label(quantities, "kN"))
     return finish(ax)
 
@@ -210,21 +225,19 @@ def subjects(run: Run, counterpart: Run | None) -> list[Subject]:
 def _paper_figures(run: Run) -> list[Subject]:
     trajectory = run.trajectory
 
-    def subject(
-        number: int, name: str, title: str, text: str, needs: Sequence[Quantity], panel: Panel | None = None
-    ) -> Subject:
+    def subject(number: int, name: str, title: str, text: str, needs: Sequence[Quantity]) -> Subject:
         return Subject(
             file=f"figure-{number:02d}-{name}.svg",
             title=title,
             caption=lambda: f"Figure {number} of the paper. {text}" + (_shift(run, needs) if number in (3, 4) else ""),
-            panels=(panel or partial(plot_quantities, trajectory, needs),),
+            panels=(partial(plot_quantities, trajectory, needs),),
             sources=(trajectory,),
             needs=needs,
         )
 
-    def excitations(ax: Axes) -> Axes:
-        Lambda, v0 = numbers(run, "Lambda", "v0")
-        return plot_excitations(trajectory, Lambda / v0, ax)
+    def road_window() -> Window:
+        Lambda, v0 = real_parameters(run, "Lambda", "v0")
+        return uneven(trajectory, Lambda / v0)
 
     road = (
         "Height of the road under each wheel, where it is not flat (of an endless road the first waves). "
@@ -233,9 +246,14 @@ def _paper_figures(run: Run) -> list[Subject]:
     heaves = "Body and rear axle, up, from static equilibrium; the front wheels of figure 3 lightly."
     angles = "Roll ψ, positive where the left side goes up, and pitch φ, positive nose down."
     return [
-        subject(2, "excitations", "Excitations on all wheels", road, ROAD_HEIGHTS, excitations),
-        subject(3, "front-wheels", "Vertical displacements of the front wheels", "Up, from equilibrium.", (Z11, Z12)),
-        subject(4, "heaves", "Vertical displacements", heaves, (Z, Z2, Z11, Z12), partial(plot_heaves, trajectory)),
+        replace(subject(2, "excitations", "Excitations on all wheels", road, ROAD_HEIGHTS), window=road_window),
+        subject(
+            3, "front-wheels", "Vertical displacements of the front wheels", "Up, from static equilibrium.", (Z11, Z12)
+        ),
+        replace(
+            subject(4, "heaves", "Vertical displacements", heaves, (Z, Z2, Z11, Z12)),
+            panels=(partial(plot_heaves, trajectory),),
+        ),
         subject(5, "car-rotation", "Car rotation angles", angles, (PSI, PHI)),
         subject(6, "axle-rotation", "Rotation angle of the rear axle", "Roll ψ₂, positive like ψ.", (PSI2,)),
     ]
@@ -250,10 +268,10 @@ def _shift(run: Run, quantities: Sequence[Quantity]) -> str:
     if heights[-1].any() or not heights.any():
         return ""
     unit, factor = READING["m"]
-    ends = ", ".join(f"{words(q)} {factor * trajectory[q.name][-1]:.2g} {unit}" for q in quantities)
+    ends = ", ".join(f"{words(q)} {readable(factor * trajectory[q.name][-1], 2)} {unit}" for q in quantities)
     return (
         " The paper reads from its figures 3 and 4 that the displacements remain constant behind the unevenness "
-        f"(“vibrational shift”). Here, at t = {trajectory.time[-1]:g} s: {ends}."
+        f"(“vibrational shift”). Here, at t = {trajectory.time[-1]:g}\N{NO-BREAK SPACE}s: {ends}."
     )
 
 
@@ -332,13 +350,29 @@ def left_out(run: Run, counterpart: Run | None) -> list[tuple[str, list[str]]]:
 def render(subject: Subject) -> bytes:
     """The figure as SVG; the same data give the same bytes, whatever style the user has set."""
     with style.context(STYLE, after_reset=True):
-        panels = subject.panels
-        figure = Figure(figsize=(WIDTH, PANEL_HEIGHT * len(panels) + 0.4), layout="constrained")
-        for panel, ax in zip(panels, figure.subplots(len(panels), 1, sharex=True, squeeze=False).flat, strict=True):
+        n = len(subject.panels)
+        figure = Figure(figsize=(WIDTH, PANEL_HEIGHT * n + 0.4), layout="constrained")
+        axes = figure.subplots(n, 1, sharex=True, squeeze=False).ravel()
+        for panel, ax in zip(subject.panels, axes, strict=True):
             panel(ax).label_outer()
+        start, end = subject.window() if subject.window else eventful(subject.sources, subject.needs)
+        if start < end:
+            axes[0].set_xlim(start, end)
+        for line in (line for ax in axes for line in ax.get_lines()):
+            thin(line, (start, end))
         image = io.BytesIO()
         figure.savefig(image, format="svg", metadata={"Title": subject.title, "Date": None, "Creator": None})
     return image.getvalue()
+
+
+def thin(line: Any, window: Window) -> None:
+    """Leave of a line that has far more samples than the page has columns the lowest and the highest in each column."""
+    x, y = line.get_data()
+    first, last = np.searchsorted(x, window)
+    if last - first > 4 * COLUMNS:  # a long run would give hundreds of megabytes
+        edges = np.linspace(first, last, COLUMNS, endpoint=False).astype(int)
+        extremes = [extreme.reduceat(y[:last], edges) for extreme in (np.minimum, np.maximum)]
+        line.set_data(np.repeat(x[edges], 2), np.column_stack(extremes).ravel())
 
 
 def write_whole(path: Path, content: bytes) -> None:

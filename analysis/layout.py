@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from itertools import islice, permutations
+from itertools import islice, pairwise, permutations
 
 from .wiring import Port
 
@@ -28,7 +28,7 @@ class Layout:
     def stretch(self, component: str) -> bool:
         """Whether the component's inputs follow each other in memory."""
         where = self.inputs[component]
-        return all(b - a == 1 for a, b in zip(where, where[1:], strict=False))
+        return all(b - a == 1 for a, b in pairwise(where))
 
 
 def lay_out(

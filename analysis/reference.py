@@ -5,17 +5,20 @@ A second way to the numbers of a co-simulation, and the honest comparison for it
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import fields
+from itertools import pairwise
 
 import numpy as np
 from scipy.integrate import solve_ivp
 
 from fmu_src.controller.design import design
-from fmu_src.controller.halfcar import HalfCar, half_car_state, strut_forces
+from fmu_src.controller.halfcar import HalfCar
+from fmu_src.controller.law import ACTIVATION, HORIZON, ControlParameters, control_law
+from fmu_src.controller.lqr_controller import HALF_CAR
 from fmu_src.quantities import CORNERS, PARAMETERS, STATES
 from fmu_src.road.profiles import HARMONICS, PROFILE, Road, RoadParameters, road
-from fmu_src.vehicle.equations import accelerations, strut_and_tyre_forces
+from fmu_src.vehicle.equations import equations_of_motion
 from fmu_src.vehicle.parameters import Car
 
 from .scenario import Scenario
@@ -39,6 +42,63 @@ def road_of(parameters: Parameters) -> Road:
             profile=str(parameters.get(PROFILE.name, PROFILE.start)),
             amplitudes=tuple(float(parameters.get(name, PARAMETERS[name].start)) for name in HARMONICS),
             excited=(fl, fr, rl, rr),
-            **{name: float(parameters.get(name, PARAMETERS[name].start)) for name in names},  # type: ignore[arg-type]
+            **{name: float(parameters.get(name, PARAMETERS[name].start)) for name in names},
         )
     )
+
+
+def control_of(parameters: Parameters) -> ControlParameters:
+    """The control that these parameters describe; defaults where they are silent."""
+    names = ("T", "t_on", "v0", "Lambda", "tau0", "t_start")
+    half_car = {field: float(parameters.get(name, PARAMETERS[name].start)) for name, field in HALF_CAR.items()}
+    return ControlParameters(
+        car=HalfCar(**half_car),
+        enabled=bool(parameters.get("enabled", True)),
+        horizon=str(parameters.get(HORIZON.name, HORIZON.start)),
+        activation=str(parameters.get(ACTIVATION.name, ACTIVATION.start)),
+        **{name: float(parameters.get(name, PARAMETERS[name].start)) for name in names},
+    )
+
+
+def closed_loop(scenario: Scenario, times: Array, *, rtol: float = 1e-12) -> Array:
+    """The 14 states at `times` (n,) of car, road and continuously acting controller as one system; shape (n, 14)."""
+    control = control_of(scenario.parameters)
+    made = None
+    if control.enabled:
+        finite = control.horizon == "finite"
+        made = design(control.car, infinite=not finite, span=control.end - control.begin if finite else None)
+    law = control_law(control, made)
+    switches = [t for t in (control.begin, control.end) if control.enabled and t < times[-1]]
+    x0 = np.array([scenario.start.get(q.name, 0.0) for q in STATES])
+    return integrate(scenario.parameters, law, switches, x0, times, rtol=rtol)
+
+
+def integrate(
+    parameters: Parameters,
+    forces: Callable[[float, list[float]], Sequence[float]],
+    switches: Sequence[float],
+    x0: Array,
+    times: Array,
+    *,
+    rtol: float = 1e-12,
+) -> Array:
+    """States (n, 14) at `times` (n,), from x0 at times[0], under forces(t, x) [N] that jump only at `switches` [s]."""
+    ground, motion = road_of(parameters), equations_of_motion(car_of(parameters))
+    inner = (t for t in {*ground.corners(times[-1]), *switches} if times[0] + NUDGE < t < times[-1] - NUDGE)
+    edges = [times[0], *sorted(inner), times[-1]]
+    states = np.empty((len(times), len(x0)))
+    states[0] = x = x0
+    for begin, end in pairwise(edges):
+
+        def rate(t: float, y: Array, first: float = begin + NUDGE, last: float = end - NUDGE) -> list[float]:
+            t = min(max(t, first), last)
+            state = y.tolist()
+            q, v = state[:7], state[7:]
+            accelerations, _, _ = motion(q, v, forces(t, state), ground.heights(t), ground.rates(t))
+            return [*v, *accelerations]
+
+        within = (times > begin) & (times <= end)
+        sampled = np.union1d(times[within], end)
+        solution = solve_ivp(rate, (begin, end), x, method="DOP853", rtol=rtol, atol=rtol * 1e-3, t_eval=sampled)
+        states[within], x = solution.y.T[: np.count_nonzero(within)], solution.y[:, -1]
+    return states

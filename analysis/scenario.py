@@ -162,8 +162,12 @@ class _Check:
         try:
             number = _in_si(value, q.unit)
         except ValueError as error:
-            self.fault(section, q.name, f"{q.name} = {value!r}: wanted {q.text} in {q.unit} (a number, or a string like "
-                       f"'{q.start:g} {q.unit}'), {error}")
+            self.fault(
+                section,
+                q.name,
+                f"{q.name} = {value!r}: wanted {q.text} in {q.unit} (a number, or a string like "
+                f"'{q.start:g} {q.unit}'), {error}",
+            )
             return q.start
         if fault := q.fault(number):
             self.fault(section, q.name, fault)
@@ -186,9 +190,17 @@ class _Check:
 
     def span(self, s: Scenario) -> None:
         if not s.stop_time > s.start_time:
-            self.fault("simulation", "stop_time", f"stop_time = {s.stop_time!r} s: wanted more than start_time = {s.start_time!r} s")
+            self.fault(
+                "simulation",
+                "stop_time",
+                f"stop_time = {s.stop_time!r} s: wanted more than start_time = {s.start_time!r} s",
+            )
         elif (s.stop_time - s.start_time) / s.step > MAX_STEPS:
-            self.fault("simulation", "step", f"step = {s.step!r} s: wanted at most {MAX_STEPS} steps to stop_time = {s.stop_time!r} s")
+            self.fault(
+                "simulation",
+                "step",
+                f"step = {s.step!r} s: wanted at most {MAX_STEPS} steps to stop_time = {s.stop_time!r} s",
+            )
 
 
 def _in_si(value: Any, unit: str) -> float:
@@ -218,14 +230,15 @@ def _pint_unit(unit: str) -> str:
 
 def _line_of(lines: list[str], section: str, key: str) -> int | None:
     """Line (from 1) on which a key of a section is set, or on which the section begins."""
+    name = rf"""["']?{re.escape(key)}["']?"""
+    setting, dotted = re.compile(rf"\s*{name}\s*="), re.compile(rf"\s*{section}\s*(\.\s*{name}\s*)?=")
     current = ""
     for number, line in enumerate(lines, start=1):
         if header := re.match(r"\s*\[\s*([\w.-]+)\s*\]", line):
             current = header[1]
-            if not section and current == key:
-                return number
-        elif re.match(rf"""\s*["']?{re.escape(key)}["']?\s*=""", line) and current == section:
-            return number
-        elif section and not current and re.match(rf"""\s*{section}\s*(\.\s*["']?{re.escape(key)}["']?\s*)?=""", line):
+            found = not section and current == key
+        else:
+            found = bool(setting.match(line) if current == section else section and not current and dotted.match(line))
+        if found:
             return number
     return None

@@ -70,7 +70,9 @@ def read_csv(path: Path) -> Trajectory:
     except (OSError, UnicodeDecodeError) as error:
         raise InputError(f"{path}: cannot be read: {error}") from error
     if not rows or rows[0][:1] != ["time"]:
-        raise InputError(f"{path}: row 1: wanted a header that begins with 'time', got {rows[0][:3] if rows else 'nothing'}")
+        raise InputError(
+            f"{path}: row 1: wanted a header that begins with 'time', got {rows[0][:3] if rows else 'nothing'}"
+        )
     names = tuple(rows[0][1:])
     if len(set(names)) < len(names):
         twice = next(name for name in names if names.count(name) > 1)

@@ -87,7 +87,7 @@ def timed(candidate: Callable[[], object]) -> float:
 def main() -> None:
     scenario = read_scenario("bump-lqr")
     one_step = dataclasses.replace(scenario, stop_time=scenario.step)
-    times = scenario.step * np.arange(STEPS + 1)
+    times = scenario.step * np.arange(STEPS + 1, dtype=np.float64)
     with tempfile.TemporaryDirectory(prefix="bench_") as temporary:
         folder = Path(temporary)
         empty, stock = empty_system(folder), stock_fmus(folder)

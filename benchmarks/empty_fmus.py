@@ -12,12 +12,12 @@ from fmu_src.controller.lqr_controller import LqrController
 from fmu_src.road.road_excitation import RoadExcitation
 from fmu_src.vehicle.vehicle7dof import Vehicle7DOF
 
-SHELL = '''from fmu_src.slave import Slave
-from fmu_src.{module} import {model} as _{model}
+SHELL = """import fmu_src.{module} as ours
+from fmu_src.slave import Slave
 
 
 class {model}(Slave):
-    inputs, outputs = _{model}.inputs, _{model}.outputs
+    inputs, outputs = ours.{model}.inputs, ours.{model}.outputs
     references = []
 
     def __init__(self, **kwargs):
@@ -35,8 +35,8 @@ class {model}(Slave):
 
     def feed_through(self):
         pass
-'''
-STOCK = '''from pythonfmu import Fmi2Causality, Fmi2Slave, Real
+"""
+STOCK = """from pythonfmu import Fmi2Causality, Fmi2Slave, Real
 
 
 class {model}(Fmi2Slave):
@@ -54,7 +54,7 @@ class {model}(Fmi2Slave):
 
     def do_step(self, current_time, step_size):
         return True
-'''
+"""
 
 
 def empty_system(folder: Path) -> Path:

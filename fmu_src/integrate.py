@@ -11,7 +11,7 @@ from typing import Any
 
 Vector = Sequence[float]
 Seven = tuple[float, float, float, float, float, float, float]
-Acceleration = Callable[[Any, Any, Any], Any]
+Motion = Callable[..., Any]
 RoadWithin = Callable[[float], tuple[Vector, Vector]]
 """Heights [m] and rates [m/s] under the four wheels at the fraction σ of a step, 0 ≤ σ ≤ 1."""
 
@@ -24,23 +24,23 @@ def advanced(x: Vector, h: float, k: Vector) -> Seven:
 
 
 def rk4(
-    acceleration: Acceleration, q: Vector, v: Vector, step: float, inputs: Sequence[Any], first: Any = None
+    motion: Motion, q: Vector, v: Vector, step: float, inputs: Sequence[Any], first: Any = None
 ) -> tuple[Seven, Seven]:
-    """(q, v) after one step of the classical fourth-order Runge–Kutta method on q̈ = a(q, q̇, w), q̇ = v.
+    """(q, v) after one step of the classical fourth-order Runge–Kutta method on q̇ = v, q̈ = motion(q, v, *w)[0].
 
     inputs : w at the start, the middle and the end of the step.
-    first  : a(q, v, inputs[0]), where it is known already.
+    first  : q̈ at the start, where it is known already.
     The slopes of q are the stage velocities, hence q + h (v + h/6 (a1 + a2 + a3)) for q after the step.
     """
     start, middle, end = inputs
     half, sixth = 0.5 * step, step / 6.0
-    a1 = acceleration(q, v, start) if first is None else first
+    a1 = motion(q, v, *start)[0] if first is None else first
     v2 = advanced(v, half, a1)
-    a2 = acceleration(advanced(q, half, v), v2, middle)
+    a2 = motion(advanced(q, half, v), v2, *middle)[0]
     v3 = advanced(v, half, a2)
-    a3 = acceleration(advanced(q, half, v2), v3, middle)
+    a3 = motion(advanced(q, half, v2), v3, *middle)[0]
     a23 = advanced(a2, 1.0, a3)
-    a4 = acceleration(advanced(q, step, v3), advanced(v, step, a3), end)
+    a4 = motion(advanced(q, step, v3), advanced(v, step, a3), *end)[0]
     return (
         advanced(q, step, advanced(v, sixth, advanced(a1, 1.0, a23))),
         advanced(v, sixth, advanced(advanced(a1, 2.0, a23), 1.0, a4)),
@@ -58,10 +58,7 @@ def cubic_road(h0: Vector, dh0: Vector, h1: Vector, bow: Vector, step: float) ->
     """
     if not (any(h0) or any(dh0) or any(h1) or any(bow)):
         return lambda sigma: (h0, dh0)
-    cubics = [
-        (a, step * d, b - a - step * d + 8.0 * w, -8.0 * w)
-        for a, d, b, w in zip(h0, dh0, h1, bow, strict=True)
-    ]
+    cubics = [(a, step * d, b - a - step * d + 8.0 * w, -8.0 * w) for a, d, b, w in zip(h0, dh0, h1, bow, strict=True)]
     (a1, b1, c1, d1), (a2, b2, c2, d2), (a3, b3, c3, d3), (a4, b4, c4, d4) = cubics
 
     def at(s: float) -> tuple[Vector, Vector]:

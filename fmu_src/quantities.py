@@ -169,13 +169,13 @@ ROAD_BOWS = _corner_quantities(
     "bow_{}",
     "m",
     r"\beta_{{{}}}",
-    "road height at the middle of the step just made, over the parabola through the step's two heights with its first rate",
+    "road height in the middle of the last step, over the parabola through the heights at its ends with its first rate",
     0.001,
 )
 ROAD = ROAD_HEIGHTS + ROAD_RATES + ROAD_BOWS
 FORCES = _corner_quantities("force_{}", "N", r"u_{{{}}}", "actuator force, up on the body and down on the wheel", 100.0)
 
-# ------------------------------------------------------------------ parameters (defaults: representative of a small car)
+# ------------------------------------------------------------------ parameters; defaults: representative of a small car
 PARAMETERS = {
     q.name: q
     for q in (
@@ -202,16 +202,16 @@ PARAMETERS = {
         Quantity(name="s0", unit="m", symbol="s_0", text="half distance of the rear struts", start=0.60, low=0.0),
         Quantity(name="s1", unit="m", symbol="s_1", text="half track, front", start=0.695, low=0.0),
         Quantity(name="s2", unit="m", symbol="s_2", text="half track, rear", start=0.685, low=0.0),
-        Quantity(name="h_max", unit="s", symbol="h_{max}", text="longest internal step", start=1e-3, positive=True),
+        Quantity(name="h_max", unit="s", symbol="h_{max}", text="longest internal step", start=5e-4, positive=True),
         Quantity(name="A", unit="m", symbol="A", text="amplitude of the road profile", start=0.01),
         Quantity(name="Lambda", unit="m", symbol=r"\Lambda", text="road wave length", start=1.0, positive=True),
         Quantity(name="v0", unit="m/s", symbol="v_0", text="forward speed", start=10.0, positive=True),
         Quantity(name="tau0", unit="s", symbol=r"\tau_0", text="delay of the right side after the left", start=0.02),
-        Quantity(name="t_start", unit="s", symbol="t_{A1}", text="time at which the front left wheel meets the profile"),
+        Quantity(
+            name="t_start", unit="s", symbol="t_{A1}", text="time at which the front left wheel meets the profile"
+        ),
         *(
-            Quantity(
-                name=f"A_nu[{nu}]", unit="m", symbol=f"A_{{{nu}}}", text=f"Fourier amplitude of sin({nu} Omega t)"
-            )
+            Quantity(name=f"A_nu[{nu}]", unit="m", symbol=f"A_{{{nu}}}", text=f"Fourier amplitude of sin({nu} Omega t)")
             for nu in range(1, 9)
         ),
         Quantity(

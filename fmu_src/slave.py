@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from functools import partial
 from typing import ClassVar
 from xml.etree.ElementTree import Element, SubElement
@@ -12,11 +12,10 @@ from pythonfmu.enums import Fmi2Status
 
 from .quantities import PARAMETERS, UNITS, Choice, ParameterError, Quantity, refuse
 
-
 RELEASED = "2026-11-22T00:00:00Z"  # of the version in pyproject.toml, not of the build: same sources, same bytes
 
 
-class StepRefused(Exception):
+class StepError(Exception):
     """A step that cannot be made; the message names what, where and when."""
 
 
@@ -34,6 +33,7 @@ class Slave(Fmi2Slave):
     choices: ClassVar[tuple[Choice, ...]] = ()
     switches: ClassVar[dict[str, str]] = {}  # Boolean parameters, true by default: name -> words
     dependencies: ClassVar[dict[str, tuple[str, ...]]] = {}  # output -> inputs that it depends on within a step
+    guid: object
     identity: ClassVar[str] = ""  # hash of the code, set by the slave script of an exported FMU
 
     author = "Bertolino–Bakša stability of motor vehicles: the developers"
@@ -43,7 +43,8 @@ class Slave(Fmi2Slave):
 
     def __init__(self, **kwargs: object) -> None:
         super().__init__(**kwargs)
-        self.guid = self.identity or self.guid
+        if self.identity:
+            self.guid = self.identity
         self.u = [q.start for q in self.inputs]
         self.y = [q.start for q in self.outputs]
         self.p = [PARAMETERS[name].start for name in self.reals]
@@ -87,7 +88,7 @@ class Slave(Fmi2Slave):
         """Take the state from start values and inputs at `self.time`."""
 
     def advance(self, t: float, step: float) -> None:
-        """Make a step from t to t + step [s]; raise StepRefused, with the state untouched, if that cannot be done."""
+        """Make a step from t to t + step [s]; raise StepError, with the state untouched, if that cannot be done."""
         raise NotImplementedError
 
     def feed_through(self) -> None:
@@ -140,7 +141,7 @@ class Slave(Fmi2Slave):
             return False
         try:
             self.advance(current_time, step_size)
-        except StepRefused as refusal:
+        except StepError as refusal:
             self.log(f"{self.instance_name}: {refusal}", Fmi2Status.error, "logStatusError")
             return False
         self.time = current_time + step_size
@@ -165,22 +166,20 @@ class Slave(Fmi2Slave):
         """PythonFMU's description, completed: units, limits, exact start values, UTC date, structure."""
         root = super().to_xml(model_options or {})
         root.set("generationDateAndTime", RELEASED)
-        root.find("CoSimulation").set("needsExecutionTool", "false")  # type: ignore[union-attr]
-        described = {
-            q.name: q for q in (*self.inputs, *self.outputs, *(PARAMETERS[name] for name in self.reals))
-        }
+        root.find("CoSimulation").set("needsExecutionTool", "false")
+        described = {q.name: q for q in (*self.inputs, *self.outputs, *(PARAMETERS[name] for name in self.reals))}
         for variable in root.iter("ScalarVariable"):
             real = variable.find("Real")
             if real is not None:
                 _describe(real, described[variable.get("name", "")])
-        root.insert(list(root).index(root.find("LogCategories")), self._units(described.values()))  # type: ignore[arg-type]
-        self._structure(root.find("ModelStructure"))  # type: ignore[arg-type]
+        root.insert(list(root).index(root.find("LogCategories")), self._units(described.values()))
+        self._structure(root.find("ModelStructure"))
         return root
 
     @staticmethod
-    def _units(quantities: object) -> Element:
+    def _units(quantities: Iterable[Quantity]) -> Element:
         definitions = Element("UnitDefinitions")
-        for unit in dict.fromkeys(q.unit for q in quantities):  # type: ignore[attr-defined]
+        for unit in dict.fromkeys(q.unit for q in quantities):
             exponents = {base: str(power) for base, power in UNITS[unit].items()}
             SubElement(SubElement(definitions, "Unit", name=unit), "BaseUnit", exponents)
         return definitions
@@ -193,9 +192,7 @@ class Slave(Fmi2Slave):
         outputs, initial = SubElement(structure, "Outputs"), SubElement(structure, "InitialUnknowns")
         for i, q in enumerate(self.outputs):
             depends = self.dependencies.get(q.name, ())
-            SubElement(
-                outputs, "Unknown", index=index[q.name], dependencies=" ".join(index[n] for n in depends)
-            )
+            SubElement(outputs, "Unknown", index=index[q.name], dependencies=" ".join(index[n] for n in depends))
             if i >= self.settable:
                 at_start = [index[k.name] for k in known if k in self.outputs or k.name in depends]
                 SubElement(initial, "Unknown", index=index[q.name], dependencies=" ".join(sorted(at_start, key=int)))

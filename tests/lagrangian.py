@@ -71,8 +71,8 @@ def derive() -> Derivation:
     m, m11, m12, m21, m22, m2, Jx, Jy, Jz, J2, c1, c2, cp1, cp2, b1, b2, bp1, bp2, *lengths = parameters
     s2 = lengths[-1]
     q, v = _column(COORDINATES), _column("d" + name for name in COORDINATES)
-    h, dh = _column("h11 h12 h21 h22".split()), _column("dh11 dh12 dh21 dh22".split())
-    f = _column("f_fl f_fr f_rl f_rr".split())
+    h, dh = _column(["h11", "h12", "h21", "h22"]), _column(["dh11", "dh12", "dh21", "dh22"])
+    f = _column(["f_fl", "f_fr", "f_rl", "f_rr"])
 
     struts, tyres = _geometry(q, h, lengths)
     strut_rates = struts.jacobian(q) * v

@@ -36,21 +36,28 @@ class HalfCar:
     H1: float = PARAMETERS["H1"].start
 
     def __post_init__(self) -> None:
-        faults = [PARAMETERS["lambda" if f.name == "lam" else f.name].fault(getattr(self, f.name)) for f in fields(self)]
+        faults = [
+            PARAMETERS["lambda" if f.name == "lam" else f.name].fault(getattr(self, f.name)) for f in fields(self)
+        ]
         if self.a + self.b == 0:
             faults.append("a + b = 0.0 m: wanted a wheelbase > 0")
         refuse(faults)
 
     @property
     def A(self) -> Matrix:
-        """A of (4.1). Row 4: the print has −(a c1 + b c2)/J, −(a² c1 − b² c2)/J; the signs are those of row 3 and energy."""
+        """A of (4.1). Row 4: the print has −(a c1 + b c2)/J, −(a² c1 − b² c2)/J; energy asks for the other signs."""
         m, J, a, b = self.m, self.Jy, self.a, self.b
         c1, c2, b1, b2 = 2 * self.c1, 2 * self.c2, 2 * self.b1, 2 * self.b2
         return [
             [0.0, 0.0, 1.0, 0.0],
             [0.0, 0.0, 0.0, 1.0],
             [-(c1 + c2) / m, -(a * c1 - b * c2) / m, -(b1 + b2) / m, -(a * b1 - b * b2) / m],
-            [-(a * c1 - b * c2) / J, -(a**2 * c1 + b**2 * c2) / J, -(a * b1 - b * b2) / J, -(a**2 * b1 + b**2 * b2) / J],
+            [
+                -(a * c1 - b * c2) / J,
+                -(a**2 * c1 + b**2 * c2) / J,
+                -(a * b1 - b * b2) / J,
+                -(a**2 * b1 + b**2 * b2) / J,
+            ],
         ]
 
     @property
@@ -70,7 +77,9 @@ class HalfCar:
         return [[1.0, 0.0], [0.0, 1.0]]
 
 
-def half_car_state(heave: float, pitch: float, heave_rate: float, pitch_rate: float) -> tuple[float, float, float, float]:
+def half_car_state(
+    heave: float, pitch: float, heave_rate: float, pitch_rate: float
+) -> tuple[float, float, float, float]:
     """x of (4.1) from the car's heave and nose-down pitch [m, rad] and their rates."""
     return heave, -pitch, heave_rate, -pitch_rate
 

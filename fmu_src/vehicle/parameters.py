@@ -49,8 +49,8 @@ class Car:
             faults.append("a + b = 0.0 m: wanted a wheelbase > 0")
         if self.m21 != self.m22:
             faults.append(
-                f"m21 = {self.m21!r} kg, m22 = {self.m22!r} kg: wanted equal masses (Eqs. (3.4) and (3.7) hold only for "
-                "an axle whose centre of gravity lies in its middle)"
+                f"m21 = {self.m21!r} kg, m22 = {self.m22!r} kg: wanted equal masses (Eqs. (3.4) and (3.7) hold only "
+                "for an axle whose centre of gravity lies in its middle)"
             )
         if (self.m21 + self.m22) * self.s2**2 + self.J2 == 0:
             faults.append("(m21 + m22) s2^2 + J2 = 0.0 kg.m2: wanted a rear axle with roll inertia > 0")

@@ -20,15 +20,15 @@ from ..quantities import (
     Choice,
     refuse,
 )
-from ..slave import Slave, StepRefused
-from .equations import accelerations, strut_and_tyre_forces
+from ..slave import Slave, StepError
+from .equations import equations_of_motion
 from .parameters import Car
 
 CAR = tuple(f.name for f in fields(Car))
 SAMPLING = Choice(
     name="road_sampling",
     values=("start", "end"),
-    text="road inputs are values at the start of the step, carried on by their rates, or at its end (road stepped first)",
+    text="road inputs are values at the start of a step, carried on by their rates, or at its end (road stepped first)",
 )
 
 
@@ -50,26 +50,18 @@ class Vehicle7DOF(Slave):
         p = self.parameters()
         h_max, (sampling,) = p.pop("h_max"), self.chosen
         refuse([PARAMETERS["h_max"].fault(h_max), SAMPLING.fault(sampling)])
-        car = Car(**p)
         self._h_max, self._sampled_at_end = h_max, sampling == "end"
-        self._forces = forces = strut_and_tyre_forces(car)
-        self._accelerations = acceleration = accelerations(car)
-
-        def motion(q: list[float], v: list[float], w: tuple) -> tuple[float, ...]:
-            _, F, N = forces(q, v, *w)
-            return acceleration(q, v, F, N)
-
-        self._motion = motion
+        self._motion = equations_of_motion(Car(**p))
 
     def begin(self) -> None:
-        self._q, self._v = self.y[:7], self.y[7:14]
+        self._q, self._v = tuple(self.y[:7]), tuple(self.y[7:14])
         self._at = (self.u[:4], self.u[4:8], self.u[8:12])  # forces, road heights and rates at the present instant
 
     def advance(self, t: float, step: float) -> None:
         road = self._road_within(t, step)
         u = self.u[:4]
         start = (u, *road(0.0))
-        first = self.y[14:21] if start == self._at else None  # unchanged inputs: the accelerations are known
+        first = self.y[14:21] if start == self._at else None  # nothing has changed: the accelerations are known
         n = max(1, ceil(step / self._h_max - 1e-9))
         q, v = self._q, self._v
         try:
@@ -80,7 +72,7 @@ class Vehicle7DOF(Slave):
             if not isfinite(sum(q) + sum(v)):
                 raise OverflowError
         except (ValueError, OverflowError):  # ValueError: sin(inf)
-            raise StepRefused(self._runaway([*q, *v], t, step)) from None
+            raise StepError(self._runaway([*q, *v], t, step)) from None
         self._q, self._v, self._at = q, v, end
         if self._sampled_at_end:  # the rate that the next step sets out with: beyond a corner, if there is one here
             self._at = (u, self.u[4:8], self.u[8:12])
@@ -90,7 +82,7 @@ class Vehicle7DOF(Slave):
         """Road over this step as a function of the fraction of it."""
         if not isfinite(sum(self.u)):
             faults = [f"{q.name} = {x!r} {q.unit}" for q, x in zip(self.inputs, self.u, strict=True) if not isfinite(x)]
-            raise StepRefused(f"step from t = {t:g} s: wanted finite inputs, got {', '.join(faults)}")
+            raise StepError(f"step from t = {t:g} s: wanted finite inputs, got {', '.join(faults)}")
         h, dh = self.u[4:8], self.u[8:12]
         if self._sampled_at_end and step > 0.0:
             _, h0, dh0 = self._at
@@ -117,6 +109,5 @@ class Vehicle7DOF(Slave):
 
     def _observe(self) -> None:
         """All outputs, at the present state and inputs."""
-        q, v = self._q, self._v
-        travels, F, N = self._forces(q, v, *self._at)
-        self.y[:] = (*q, *v, *self._accelerations(q, v, F, N), *travels, *N)
+        accelerations, travels, N = self._motion(self._q, self._v, *self._at)
+        self.y[:] = (*self._q, *self._v, *accelerations, *travels, *N)

@@ -1,0 +1,124 @@
+"""Command line: `python -m analysis VERB …`. Files in, files out; exit 0 only if every claim held, 2 for bad input."""
+
+from __future__ import annotations
+
+import argparse
+import dataclasses
+import json
+import signal
+import sys
+from pathlib import Path
+
+from fmu_src.quantities import ParameterError
+
+from .errors import CosimError, InputError
+from .scenario import Scenario, built_in_scenarios, read_scenario
+from .trajectory import Run, new_run_folder, read_run, write_run
+
+FINDINGS, COUNTERPART = "findings.json", "counterpart"
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Run one verb; returns the exit status."""
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(128 + signal.SIGTERM))  # unwinds, so that folders are removed
+    options = _parser().parse_args(arguments)
+    try:
+        return int(options.do(options))
+    except (InputError, CosimError, ParameterError) as error:
+        print(f"error: {error}", file=sys.stderr)
+        return 2
+    except KeyboardInterrupt:
+        print("interrupted; nothing was written", file=sys.stderr)
+        return 128 + signal.SIGINT
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(prog="python -m analysis", description=__doc__)
+    verbs = parser.add_subparsers(required=True, metavar="VERB")
+    scenario = f"a .toml file, the run.json of an earlier run, or one of: {', '.join(built_in_scenarios())}"
+
+    verb = verbs.add_parser("run", help="simulate a scenario and its counterpart, check, and write the report")
+    verb.add_argument("scenario", help=scenario)
+    verb.add_argument("-o", "--out", type=Path, help="run folder (default: runs/SCENARIO)")
+    verb.set_defaults(do=_run)
+
+    verb = verbs.add_parser("simulate", help="co-simulate a scenario and write its run folder")
+    verb.add_argument("scenario", help=scenario)
+    verb.add_argument("-o", "--out", type=Path, required=True, metavar="RUN", help="run folder to write")
+    verb.set_defaults(do=_simulate)
+
+    verb = verbs.add_parser("check", help="check the claims on a run and write its findings.json")
+    verb.add_argument("run", type=Path, metavar="RUN", help="run folder")
+    verb.set_defaults(do=lambda o: _judge(read_run(o.run), o.run))
+
+    verb = verbs.add_parser("report", help="draw the figures of a run and write its report.html")
+    verb.add_argument("run", type=Path, metavar="RUN", help="run folder")
+    verb.set_defaults(do=_report)
+    return parser
+
+
+def _simulate(options: argparse.Namespace) -> int:
+    from .cosimulation import simulate
+
+    scenario = read_scenario(options.scenario)
+    with new_run_folder(options.out) as folder:
+        write_run(simulate(scenario, progress=True), folder)
+    print(f"{options.out}: written")
+    return 0
+
+
+def _run(options: argparse.Namespace) -> int:
+    from .cosimulation import simulate
+    from .report import write_report
+
+    scenario = read_scenario(options.scenario)
+    target = options.out or Path("runs") / scenario.name
+    with new_run_folder(target) as folder:
+        run = simulate(scenario, progress=True)
+        write_run(run, folder)
+        _simulate_counterpart(scenario, run, folder / COUNTERPART)
+        verdict = _judge(run, folder)
+        print("Drawing the figures ...", file=sys.stderr, flush=True)
+        write_report(folder)
+    print(f"{target / 'report.html'}: written")
+    return verdict
+
+
+def _simulate_counterpart(scenario: Scenario, run: Run, folder: Path) -> None:
+    """The same scenario with the controller switched the other way, for the figures that compare."""
+    from .cosimulation import simulate
+
+    switched = {**scenario.parameters, "enabled": not run.parameters["enabled"]}
+    name = f"{scenario.name}, control {'on' if switched['enabled'] else 'off'}"
+    try:
+        other = simulate(dataclasses.replace(scenario, name=name, parameters=switched), progress=True)
+    except CosimError as error:
+        print(f"no run with the controller switched the other way for comparison: {error}", file=sys.stderr)
+        return
+    folder.mkdir()
+    write_run(other, folder)
+
+
+def _judge(run: Run, folder: Path) -> int:
+    """Check, write findings.json, print a line for each; 0 if all hold, 1 if not."""
+    from .check import check
+
+    findings = check(run)
+    part = folder / f"{FINDINGS}.part"
+    part.write_text(json.dumps([f.as_json() for f in findings], indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
+    part.replace(folder / FINDINGS)
+    for f in findings:
+        verdict = "holds" if f.holds else "FAILS"
+        print(f"{verdict}: {f.claim}: {f.measured:.3g} (wanted {f.expected:g} ± {f.tolerance:.2g}; {f.source})")
+    return 0 if all(f.holds for f in findings) else 1
+
+
+def _report(options: argparse.Namespace) -> int:
+    from .report import write_report
+
+    print(f"{write_report(options.run)}: written")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,96 @@
+"""Energy of the car along an exported trajectory: what is stored, what the road and the actuators give, what is lost.
+
+d(T + V)/dt = Σ N ḣ + Σ u Δ̇ − Σ b Δ̇² − Σ bp (ḣ − ż_w)²
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.interpolate import CubicHermiteSpline
+
+from fmu_src.quantities import FORCES, ROAD_BOWS, ROAD_HEIGHTS, ROAD_RATES, STATES, STRUT_TRAVELS
+from fmu_src.vehicle.parameters import Car
+
+from .trajectory import Array, Trajectory
+
+
+@dataclass(frozen=True, slots=True)
+class Balance:
+    """Energies [J] over a whole trajectory: gain of T + V, work of the road, work of the actuators, loss in dampers."""
+
+    stored: float
+    road: float
+    actuators: float
+    dissipated: float
+
+    @property
+    def residual(self) -> float:
+        """What the balance leaves unexplained [J]."""
+        return self.stored - self.road - self.actuators + self.dissipated
+
+
+def kinetic_energy(car: Car, x: Array) -> Array:
+    """T [J] (n,) of states x (n, 14)."""
+    psi, (dz, dpsi, dphi, dz11, dz12, dz2, dpsi2) = x[:, 1], x[:, 7:].T
+    J = car.Jy * np.cos(psi) ** 2 + car.Jz * np.sin(psi) ** 2
+    rear = car.m21 + car.m22
+    twice = car.m * dz**2 + car.Jx * dpsi**2 + J * dphi**2 + car.m11 * dz11**2 + car.m12 * dz12**2
+    return 0.5 * (twice + (rear + car.m2) * dz2**2 + (rear * car.s2**2 + car.J2) * dpsi2**2)
+
+
+def tyre_heights(car: Car, x: Array) -> tuple[Array, Array]:
+    """Heights [m] of the four wheels (n, 4) over the road at rest, and their rates [m/s]."""
+    z11, z12, z2, psi2 = x[:, 3:7].T
+    dz11, dz12, dz2, dpsi2 = x[:, 10:14].T
+    tilt, dtilt = car.s2 * np.sin(psi2), car.s2 * np.cos(psi2) * dpsi2
+    return np.column_stack([z11, z12, z2 + tilt, z2 - tilt]), np.column_stack([dz11, dz12, dz2 + dtilt, dz2 - dtilt])
+
+
+def strut_rates(car: Car, x: Array) -> Array:
+    """Rates of strut travel Δ̇ [m/s] (n, 4)."""
+    _, psi, phi, _, _, _, psi2 = x[:, :7].T
+    dz, dpsi, dphi, dz11, dz12, dz2, dpsi2 = x[:, 7:].T
+    lift = np.cos(psi) * np.cos(phi) * dpsi - np.sin(psi) * np.sin(phi) * dphi
+    front, rear = dz - car.a * np.cos(phi) * dphi, dz + car.b * np.cos(phi) * dphi - dz2
+    roll = car.s0 * (lift - np.cos(psi2) * dpsi2)
+    return np.column_stack([front + car.s1 * lift - dz11, front - car.s1 * lift - dz12, rear + roll, rear - roll])
+
+
+def balance(car: Car, trajectory: Trajectory) -> Balance:
+    """Energy balance of a trajectory from its exported columns, to order 4 in its step.
+
+    Within a step the road is the cubic of its height and rate at the start, its bow and its height at the end (the rate
+    at the end, a right-hand limit, would be wrong where the step ends on a corner); wheels and struts are the cubics of
+    their values and rates at both ends; powers are integrated by Gauss's rule. Actuator forces are held.
+    """
+    t, step = trajectory.time, np.diff(trajectory.time)
+    x, h, dh, bow, u, travel = (trajectory.columns([q.name for q in table]) for table in _TABLES)
+    heights, rates = tyre_heights(car, x)
+    c, cp = np.array([car.c1, car.c1, car.c2, car.c2]), np.array([car.cp1, car.cp1, car.cp2, car.cp2])
+    b, bp = np.array([car.b1, car.b1, car.b2, car.b2]), np.array([car.bp1, car.bp1, car.bp2, car.bp2])
+    energy = kinetic_energy(car, x) + 0.5 * (travel**2 @ c + (h - heights) ** 2 @ cp)
+    wheel, strut = CubicHermiteSpline(t, heights, rates), CubicHermiteSpline(t, travel, strut_rates(car, x))
+
+    nodes, weights = np.polynomial.legendre.leggauss(4)
+    road_power, loss = np.zeros(len(step)), np.zeros(len(step))
+    linear, bows = step[:, None] * dh[:-1], 8.0 * bow[1:]
+    quadratic = np.diff(h, axis=0) - linear + bows
+    for node, weight in zip(0.5 * (1.0 + nodes), 0.5 * weights, strict=True):
+        at = t[:-1] + node * step
+        road = h[:-1] + node * (linear + node * (quadratic - node * bows))
+        road_rate = (linear + node * (2.0 * quadratic - 3.0 * node * bows)) / step[:, None]
+        compression_rate = road_rate - wheel(at, 1)
+        N = cp * (road - wheel(at)) + bp * compression_rate
+        road_power += weight * np.sum(N * road_rate, axis=1)
+        loss += weight * (strut(at, 1) ** 2 @ b + compression_rate**2 @ bp)
+    return Balance(
+        stored=float(energy[-1] - energy[0]),
+        road=float(road_power @ step),
+        actuators=float(np.sum(u[:-1] * np.diff(travel, axis=0))),
+        dissipated=float(loss @ step),
+    )
+
+
+_TABLES = (STATES, ROAD_HEIGHTS, ROAD_RATES, ROAD_BOWS, FORCES, STRUT_TRAVELS)
