@@ -32,7 +32,7 @@ MODELS = {
     "Vehicle7DOF": "vehicle.vehicle7dof",
     "LqrController": "controller.lqr_controller",
 }
-ENTRY = '''"""Slave script of {model}.fmu; the hash in names keeps it apart from other versions in the same host process."""
+ENTRY = '''"""Slave script of {model}.fmu; the hash in its name keeps it apart from other versions in a process."""
 
 from {package}.{module} import {model} as _{model}
 

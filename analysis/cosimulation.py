@@ -193,7 +193,7 @@ class _Table:
 
 
 def _advance(stages: list[_Stage], steps: range, start: float, step: float, length: float, rows: Array) -> None:
-    """Make the steps k from t = start + k·step, of this length [s]: for each component set inputs, step, get outputs."""
+    """Make the steps k from t = start + k·step, of this length [s]: set inputs, step, get outputs of each component."""
     width = rows.shape[1]
     flat, stride = rows.reshape(-1), width * DOUBLE
     calls = [(s, s.component, s.component.pointer, len(s.inputs), len(s.outputs)) for s in stages]

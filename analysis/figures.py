@@ -229,7 +229,9 @@ def _paper_figures(run: Run) -> list[Subject]:
         return Subject(
             file=f"figure-{number:02d}-{name}.svg",
             title=title,
-            caption=lambda: f"Figure {number} of the paper. {text}" + (_shift(run, needs) if number in (3, 4) else ""),
+            caption=lambda: (
+                f"As figure {number} of the paper. {text}" + (_shift(run, needs) if number in (3, 4) else "")
+            ),
             panels=(partial(plot_quantities, trajectory, needs),),
             sources=(trajectory,),
             needs=needs,
@@ -241,7 +243,7 @@ def _paper_figures(run: Run) -> list[Subject]:
 
     road = (
         "Height of the road under each wheel, where it is not flat (of an endless road the first waves). "
-        "Every wheel meets the same profile, each after its own delay."
+        "A wheel meets the profile after its own delay, if the profile lies in its track."
     )
     heaves = "Body and rear axle, up, from static equilibrium; the front wheels of figure 3 lightly."
     angles = "Roll ψ, positive where the left side goes up, and pitch φ, positive nose down."
@@ -286,7 +288,7 @@ def _comparison(controlled: Trajectory, uncontrolled: Trajectory) -> Subject:
         file="figure-09-stabilization.svg",
         title="Controlled against uncontrolled car",
         caption=lambda: (
-            "Figure 9 of the paper. Red: optimal stabilization; blue: without control forces. Heave z, up; pitch φ, "
+            "As figure 9 of the paper. Red: optimal stabilization; blue: without control forces. Heave z, up; pitch φ, "
             "positive nose down (the paper's section 4 has it front up); below them roll ψ, which the controller does "
             "not see. Here the car is the full one, with seven degrees of freedom; the paper's is the half car."
         ),
@@ -301,7 +303,7 @@ def _strut_forces(trajectory: Trajectory, whose: str) -> Subject:
         file="figure-10-control-forces.svg",
         title="Control forces of the struts",
         caption=lambda: (
-            "Figure 10 of the paper, by strut: positive pushes the body up and the wheel down. The paper's forces, per "
+            "As figure 10 of the paper, by strut: positive pushes the body up and the wheel down. The paper's forces, per "
             f"axle and positive down on the body, are u₁ = −(u₁₁ + u₁₂) and u₂ = −(u₂₁ + u₂₂).{whose}"
         ),
         panels=(partial(plot_quantities, trajectory, FORCES),),

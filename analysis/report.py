@@ -169,8 +169,8 @@ def control_words(run: Run) -> str:
     horizon = f"{known.get('horizon', 'unknown')} horizon"
     if known.get("horizon") == "finite":
         horizon += ", T = {:g} s".format(*figures.real_parameters(run, "T"))
-    begin = known.get("activation", "a time not recorded")
-    if begin == "at t_on":
+    begin = "the come-down of the last wheel"
+    if known.get("activation") == "at t_on":
         begin = "t = {:g} s".format(*figures.real_parameters(run, "t_on"))
     return f"controller on ({horizon}, from {begin})"
 

@@ -126,11 +126,13 @@ def test_each_figure_names_its_number_in_the_paper(tmp_path: Path, monkeypatch: 
         assert all((tmp_path / "figures" / entry.file).is_file() for entry in entries)
         return [entry.caption.split(" of the paper")[0].split(".")[0] for entry in entries]
 
-    always = [f"Figure {number}" for number in (2, 3, 4, 5, 6)]
+    always = [f"As figure {number}" for number in (2, 3, 4, 5, 6)]
     assert numbers(run, None) == [*always, "Not in the paper"]
-    assert numbers(controlled, None) == [*always, "Figure 10", "Not in the paper"]
+    assert numbers(controlled, None) == [*always, "As figure 10", "Not in the paper"]
     assert (
-        numbers(run, controlled) == numbers(controlled, run) == [*always, "Figure 9", "Figure 10", "Not in the paper"]
+        numbers(run, controlled)
+        == numbers(controlled, run)
+        == [*always, "As figure 9", "As figure 10", "Not in the paper"]
     )
     assert numbers(run, run) == numbers(run, None)  # a counterpart that is none
 

@@ -6,7 +6,7 @@ from dataclasses import fields
 from math import ceil, isfinite
 from typing import ClassVar
 
-from ..integrate import RoadWithin, cubic_road, rk4, straight_road
+from ..integrate import RoadWithin, Vector, cubic_road, rk4, straight_road
 from ..quantities import (
     ACCELERATIONS,
     FORCES,
@@ -55,7 +55,8 @@ class Vehicle7DOF(Slave):
 
     def begin(self) -> None:
         self._q, self._v = tuple(self.y[:7]), tuple(self.y[7:14])
-        self._at = (self.u[:4], self.u[4:8], self.u[8:12])  # forces, road heights and rates at the present instant
+        # forces, road heights and rates at the present instant
+        self._at: tuple[Vector, Vector, Vector] = (self.u[:4], self.u[4:8], self.u[8:12])
 
     def advance(self, t: float, step: float) -> None:
         road = self._road_within(t, step)
