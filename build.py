@@ -15,6 +15,7 @@ import shutil
 import subprocess
 import sys
 import tempfile
+import tomllib
 import venv
 import zipfile
 from pathlib import Path
@@ -59,8 +60,9 @@ def environment_python() -> Path:
 
 def enter_environment(extras: list[str]) -> None:
     """Set up `.venv` if it is missing or stale, then continue this very command inside it."""
-    sources = [ROOT / "pyproject.toml", ROOT / "constraints.txt"]
-    key = hashlib.sha256(b"".join(path.read_bytes() for path in sources)).hexdigest()
+    settings = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
+    wanted = [settings["project"], settings["build-system"], (ROOT / "constraints.txt").read_text(encoding="utf-8")]
+    key = hashlib.sha256(json.dumps(wanted).encode()).hexdigest()
     installed = json.loads(STAMP.read_text()) if STAMP.is_file() else {}
     if installed.get("key") != key or not set(extras) <= set(installed["extras"]):
         if Path(sys.prefix) == ENVIRONMENT:

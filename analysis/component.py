@@ -24,11 +24,32 @@ Access = ctypes.PYFUNCTYPE(ctypes.c_int, ctypes.c_void_p, ctypes.c_void_p, ctype
 Step = ctypes.PYFUNCTYPE(ctypes.c_int, ctypes.c_void_p, ctypes.c_double, ctypes.c_double, ctypes.c_int)
 
 
+_logs: dict[int, list[str]] = {}  # messages of each living component, by the environment its callbacks carry
+
+
+@fmi2CallbackLoggerTYPE
+def _logger(environment: int, _name: bytes, status: int, _category: bytes, message: bytes) -> None:
+    """The one logger of this process: fmpy's proxy, which fills in the arguments of a message, keeps only one."""
+    if status > WARNING and environment in _logs:
+        _logs[environment].append(" ".join(message.decode("utf-8", "replace").split()))
+
+
+def _callbacks(environment: int) -> Any:
+    callbacks = fmi2CallbackFunctions()
+    callbacks.logger = _logger
+    callbacks.allocateMemory = defaultCallbacks.allocateMemory
+    callbacks.freeMemory = defaultCallbacks.freeMemory
+    callbacks.componentEnvironment = environment
+    addLoggerProxy(ctypes.byref(callbacks))
+    return callbacks
+
+
 class Component:
     """An instantiated FMU. `variables`: by name, as in its model description."""
 
     def __init__(self, name: str, archive: Path, folder: Path) -> None:
         self.name, self.log = name, list[str]()
+        _logs[id(self.log)] = self.log
         self.sha256 = hashlib.sha256(archive.read_bytes()).hexdigest()
         try:
             extract(archive, folder)
@@ -43,7 +64,7 @@ class Component:
                 unzipDirectory=str(folder),
                 instanceName=name,
             )
-            self.fmu.instantiate(callbacks=self._callbacks(), loggingOn=True)
+            self.fmu.instantiate(callbacks=_callbacks(id(self.log)), loggingOn=True)
         except CosimError:
             raise
         except Exception as error:  # fmpy raises bare Exceptions
@@ -53,18 +74,6 @@ class Component:
         self.do_step = Step(_address(self.fmu, "fmi2DoStep"))
         self.pointer = ctypes.c_void_p(self.fmu.component)
         self._usable = True
-
-    def _callbacks(self) -> Any:
-        def logger(_env: Any, _name: bytes, status: int, _category: bytes, message: bytes) -> None:
-            if status > WARNING:
-                self.log.append(message.decode("utf-8", "replace").strip())
-
-        callbacks = fmi2CallbackFunctions()
-        callbacks.logger = fmi2CallbackLoggerTYPE(logger)
-        callbacks.allocateMemory = defaultCallbacks.allocateMemory
-        callbacks.freeMemory = defaultCallbacks.freeMemory
-        addLoggerProxy(ctypes.byref(callbacks))
-        return callbacks
 
     def named(self, causality: str) -> list[str]:
         """Names of the real variables of this causality, in the FMU's order."""
@@ -120,6 +129,7 @@ class Component:
         if self._usable:
             self.fmu.terminate()
         self.fmu.freeInstance()
+        del _logs[id(self.log)]
 
 
 def _address(fmu: Any, function: str) -> int:

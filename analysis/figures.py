@@ -245,13 +245,12 @@ def _paper_figures(run: Run) -> list[Subject]:
         "Height of the road under each wheel, where it is not flat (of an endless road the first waves). "
         "A wheel meets the profile after its own delay, if the profile lies in its track."
     )
+    wheels = "Up, from static equilibrium."
     heaves = "Body and rear axle, up, from static equilibrium; the front wheels of figure 3 lightly."
     angles = "Roll ψ, positive where the left side goes up, and pitch φ, positive nose down."
     return [
         replace(subject(2, "excitations", "Excitations on all wheels", road, ROAD_HEIGHTS), window=road_window),
-        subject(
-            3, "front-wheels", "Vertical displacements of the front wheels", "Up, from static equilibrium.", (Z11, Z12)
-        ),
+        subject(3, "front-wheels", "Vertical displacements of the front wheels", wheels, (Z11, Z12)),
         replace(
             subject(4, "heaves", "Vertical displacements", heaves, (Z, Z2, Z11, Z12)),
             panels=(partial(plot_heaves, trajectory),),
@@ -267,7 +266,7 @@ def _shift(run: Run, quantities: Sequence[Quantity]) -> str:
     if not {q.name for q in ROAD_HEIGHTS} <= set(trajectory.names):
         return ""
     heights = trajectory.columns([q.name for q in ROAD_HEIGHTS])
-    if heights[-1].any() or not heights.any():
+    if heights[-2:].any() or not heights.any():
         return ""
     unit, factor = READING["m"]
     ends = ", ".join(f"{words(q)} {readable(factor * trajectory[q.name][-1], 2)} {unit}" for q in quantities)
@@ -303,8 +302,8 @@ def _strut_forces(trajectory: Trajectory, whose: str) -> Subject:
         file="figure-10-control-forces.svg",
         title="Control forces of the struts",
         caption=lambda: (
-            "As figure 10 of the paper, by strut: positive pushes the body up and the wheel down. The paper's forces, per "
-            f"axle and positive down on the body, are u₁ = −(u₁₁ + u₁₂) and u₂ = −(u₂₁ + u₂₂).{whose}"
+            "As figure 10 of the paper, by strut: positive pushes the body up and the wheel down. The paper's forces, "
+            f"per axle and positive down on the body, are u₁ = −(u₁₁ + u₁₂) and u₂ = −(u₂₁ + u₂₂).{whose}"
         ),
         panels=(partial(plot_quantities, trajectory, FORCES),),
         sources=(trajectory,),

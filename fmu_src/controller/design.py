@@ -12,6 +12,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 
 from .halfcar import HalfCar
+from .riccati import finite_horizon, infinite_horizon, riccati_rate
 
 Gain = tuple[float, ...]
 """K (2 × 4), row after row."""
@@ -64,8 +65,6 @@ def design(car: HalfCar, *, infinite: bool, span: float | None) -> Design:
     Raises ImportError where numpy, scipy or (infinite horizon) control are missing.
     """
     import numpy as np
-
-    from .riccati import finite_horizon, infinite_horizon, riccati_rate
 
     A, B, Q, R = (np.array(M) for M in (car.A, car.B, car.Q, car.R))
     forever = tuple(infinite_horizon(A, B, Q, R)[1].ravel().tolist()) if infinite else None

@@ -1,0 +1,41 @@
+"""Shared by all tests: a seeded generator, the default car, its Lagrangian twin, and the built FMUs."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import lagrangian
+import numpy as np
+import pytest
+
+from fmu_src.vehicle.parameters import Car
+
+ROOT = Path(__file__).resolve().parents[1]
+
+
+@pytest.fixture
+def rng() -> np.random.Generator:
+    return np.random.default_rng(20261122)
+
+
+@pytest.fixture(scope="session")
+def car() -> Car:
+    """A car with every parameter away from zero and from symmetry that the model allows."""
+    return Car(m11=28.0, m12=33.0, bp1=90.0, bp2=70.0)
+
+
+@pytest.fixture(scope="session")
+def lagrange(car: Car) -> Callable[..., Any]:
+    """The same car's accelerations from the energies."""
+    return lagrangian.accelerations(asdict(car))
+
+
+@pytest.fixture(scope="session")
+def dist() -> Path:
+    """Folder of the built FMUs; `build.py test` builds them before the tests run."""
+    folder = ROOT / "dist"
+    assert (folder / "VehicleOnRoad.ssp").is_file(), "build the FMUs first: python3 build.py build"
+    return folder

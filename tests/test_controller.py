@@ -1,0 +1,169 @@
+"""Optimal stabilization: Riccati equations, the stored design, signs, and the controller as a slave."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from conftest import ROOT
+from numpy.testing import assert_allclose
+from scipy.linalg import expm, solve_continuous_are
+
+from fmu_src.controller import design as designs
+from fmu_src.controller.design import DEFAULT_SPAN, Design, design, store, stored
+from fmu_src.controller.halfcar import HalfCar, half_car_state, strut_forces
+from fmu_src.controller.law import ControlParameters, control_law
+from fmu_src.controller.lqr_controller import LqrController
+from fmu_src.controller.riccati import finite_horizon, infinite_horizon, riccati_rate
+from fmu_src.quantities import ParameterError
+from fmu_src.vehicle.linear import linearized
+from fmu_src.vehicle.parameters import Car
+
+Array = np.ndarray[Any, Any]
+
+
+@pytest.fixture(scope="module")
+def matrices() -> tuple[Array, Array, Array, Array]:
+    h = HalfCar()
+    return np.array(h.A), np.array(h.B), np.array(h.Q), np.array(h.R)
+
+
+@pytest.fixture(scope="module")
+def default_design() -> Design:
+    return design(HalfCar(), infinite=True, span=DEFAULT_SPAN)
+
+
+def test_scalar_lqr_has_its_closed_form() -> None:
+    """x' = a x + u, q = r = 1: L = a + w, and L(s) = sinh ws / (w cosh ws − a sinh ws), with w = √(a² + 1)."""
+    a, s = 0.7, np.linspace(0, 3, 61)
+    A, B, Q, R = (np.array([[x]]) for x in (a, 1.0, 1.0, 1.0))
+    w = np.sqrt(a**2 + 1)
+    assert_allclose(infinite_horizon(A, B, Q, R)[0], [[a + w]], rtol=1e-12)
+    expected = np.sinh(w * s) / (w * np.cosh(w * s) - a * np.sinh(w * s))
+    assert_allclose(finite_horizon(A, B, Q, R, s)[:, 0, 0], expected, rtol=1e-10, atol=1e-12)
+
+
+def test_algebraic_riccati_residual_vanishes_and_scipy_agrees(matrices: tuple[Array, Array, Array, Array]) -> None:
+    L, K = infinite_horizon(*matrices)
+    A, B, Q, R = matrices
+    assert np.abs(riccati_rate(L, *matrices)).max() < 1e-9 * np.abs(Q).max()
+    assert_allclose(L, solve_continuous_are(A, B, Q, R), rtol=1e-7, atol=1e-7 * np.abs(L).max())
+    assert_allclose(K, -np.linalg.solve(R, B.T @ L), rtol=1e-9)
+    assert np.linalg.eigvals(A + B @ K).real.max() < np.linalg.eigvals(A).real.max() < 0
+
+
+def test_finite_horizon_agrees_with_the_hamiltonian_exponential(matrices: tuple[Array, Array, Array, Array]) -> None:
+    """L(s) = P X⁻¹ from [X; P]' along the Hamiltonian flow: a second way to (4.7), by doubling exact steps."""
+    A, B, Q, R = matrices
+    S = B @ np.linalg.solve(R, B.T)
+    to_go = np.linspace(0, 2.5, 101)
+    L = finite_horizon(*matrices, to_go)
+    flow = expm(np.block([[-A, S], [Q, A.T]]) * to_go[1])
+    expected = np.zeros((4, 4))
+    for k, each in enumerate(L):
+        if k:
+            X, P = np.split(flow @ np.vstack([np.eye(4), expected]), 2)
+            expected = P @ np.linalg.inv(X)
+        assert_allclose(each, expected, rtol=1e-8, atol=1e-9 * np.abs(L[-1]).max())
+        assert_allclose(each, each.T)
+        assert np.linalg.eigvalsh(each).min() > -1e-9 * np.abs(each).max() - 1e-12
+
+
+def test_finite_horizon_tends_to_the_infinite_one(matrices: tuple[Array, Array, Array, Array]) -> None:
+    L, _ = infinite_horizon(*matrices)
+    assert_allclose(finite_horizon(*matrices, np.array([0.0, 8.0]))[-1], L, rtol=1e-6, atol=1e-6 * np.abs(L).max())
+
+
+def test_the_half_car_is_the_car_without_wheels(matrices: tuple[Array, Array, Array, Array]) -> None:
+    """With stiff, light wheels the car's slow heave and pitch poles are those of (4.1) as corrected."""
+    light = Car(m11=1e-3, m12=1e-3, m21=1e-3, m22=1e-3, m2=0.0, J2=1e-3, cp1=1e9, cp2=1e9)
+    poles = np.linalg.eigvals(linearized(light).A)
+    for pole in np.linalg.eigvals(matrices[0]):
+        assert np.abs(poles - pole).min() < 1e-3 * abs(pole)
+
+
+def test_control_signs_agree_with_the_car(matrices: tuple[Array, Array, Array, Array]) -> None:
+    """B u of (4.1), turned into strut forces, accelerates the body of the car as it does the half car."""
+    B, Bu = matrices[1], np.array(linearized(Car()).Bu)
+    for u in ([1.0, 0.0], [0.0, 1.0], [2.0, -3.0]):
+        force = Bu[7:] @ strut_forces(u)
+        assert_allclose(half_car_state(0, 0, force[0], force[2])[2:], (B @ u)[2:], rtol=1e-12)
+        assert_allclose(force[1], 0, atol=1e-15)
+
+
+def test_gains_between_table_entries_are_right(
+    default_design: Design, matrices: tuple[Array, Array, Array, Array]
+) -> None:
+    assert default_design.finite is not None
+    s = np.random.default_rng(3).uniform(0, DEFAULT_SPAN, 200)
+    s.sort()
+    L = finite_horizon(*matrices, np.array([0.0, *s]))[1:]
+    expected = np.array([(-matrices[1].T @ each).ravel() for each in L])
+    got = np.array([default_design.finite.gain(x) for x in s])
+    assert np.abs(got - expected).max() < 3e-8 * np.abs(expected).max()
+
+
+def test_a_stored_design_is_read_back_bit_for_bit(default_design: Design, tmp_path: Path) -> None:
+    store(default_design, tmp_path)
+    assert stored(tmp_path) == default_design
+    assert default_design.serves(HalfCar(), "finite", DEFAULT_SPAN)
+    assert not default_design.serves(HalfCar(), "finite", DEFAULT_SPAN + 0.1)
+    assert not default_design.serves(HalfCar(lam=1e9), "infinite", 1.0)
+
+
+def test_control_acts_from_the_come_down_of_the_last_wheel_to_T(default_design: Design) -> None:
+    x = [0.01] * 14
+    law = control_law(ControlParameters(tau0=0.02), default_design)
+    assert law(0.319, x) == law(2.3, x) == (0.0, 0.0, 0.0, 0.0)
+    assert law(0.32 - 1e-12, x) != (0.0, 0.0, 0.0, 0.0) != law(2.299, x)
+    assert ControlParameters(tau0=-0.02).begin == pytest.approx(0.30)
+    assert ControlParameters(activation="at t_on", t_on=1.0).begin == 1.0
+    assert control_law(ControlParameters(enabled=False), None)(1.0, x) == (0.0, 0.0, 0.0, 0.0)
+
+
+def test_finite_and_infinite_laws_differ_only_near_the_end(default_design: Design) -> None:
+    x = np.random.default_rng(5).normal(size=14).tolist()
+    finite, infinite = (control_law(ControlParameters(horizon=h), default_design) for h in ("finite", "infinite"))
+    assert_allclose(finite(0.4, x), infinite(0.4, x), rtol=1e-3)
+    assert np.abs(np.array(finite(2.29, x))).max() < 0.1 * np.abs(np.array(infinite(2.29, x))).max()
+
+
+@pytest.mark.parametrize(
+    ("parameters", "said"),
+    [({"T": 0.1}, "end of control after its start"), ({"lambda": -1.0}, "lambda = -1.0"), ({"v0": 0.0}, "v0 = 0.0")],
+)
+def test_the_slave_refuses_bad_parameters_by_name(parameters: dict[str, float], said: str) -> None:
+    slave = LqrController(instance_name="controller", resources="")
+    for name, value in parameters.items():
+        slave.p[slave.reals.index(name)] = value
+    with pytest.raises(ParameterError, match=said):
+        slave.exit_initialization_mode()
+
+
+def test_a_design_that_needs_missing_packages_says_what_to_install() -> None:
+    """In a Python that cannot import numpy, the stored design works and another one is refused with the remedy."""
+    code = (
+        "import sys; sys.modules['numpy'] = None\n"
+        "from fmu_src.controller.lqr_controller import LqrController\n"
+        "c = LqrController(instance_name='c', resources='')\n"
+        "try: c.exit_initialization_mode()\n"
+        "except ValueError as refusal: print(refusal)\n"
+    )
+    said = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True).stdout
+    assert "not installed: numpy" in said
+    assert "Install 'control'" in said
+
+
+def test_the_shipped_design_is_that_of_the_default_parameters(dist: Path, default_design: Design) -> None:
+    import zipfile
+
+    with zipfile.ZipFile(dist / "LqrController.fmu") as archive:
+        shipped = json.loads(archive.read(f"resources/{designs.FILE_NAME}"))
+    assert shipped["car"] == asdict(HalfCar())
+    assert_allclose(shipped["infinite"], np.array(default_design.infinite), rtol=1e-9)
