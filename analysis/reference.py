@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import fields
+from functools import cache
 from itertools import pairwise
 
 import numpy as np
@@ -60,17 +61,32 @@ def control_of(parameters: Parameters) -> ControlParameters:
     )
 
 
+@cache
+def _law(p: ControlParameters) -> Callable[[float, Sequence[float]], Sequence[float]]:
+    """The control law with gains designed anew, not read from the FMU."""
+    finite = p.horizon == "finite"
+    made = design(p.car, infinite=not finite, span=p.end - p.begin if finite else None) if p.enabled else None
+    return control_law(p, made)
+
+
 def closed_loop(scenario: Scenario, times: Array, *, rtol: float = 1e-12) -> Array:
     """The 14 states at `times` (n,) of car, road and continuously acting controller as one system; shape (n, 14)."""
     control = control_of(scenario.parameters)
-    made = None
-    if control.enabled:
-        finite = control.horizon == "finite"
-        made = design(control.car, infinite=not finite, span=control.end - control.begin if finite else None)
-    law = control_law(control, made)
     switches = [t for t in (control.begin, control.end) if control.enabled and t < times[-1]]
     x0 = np.array([scenario.start.get(q.name, 0.0) for q in STATES])
-    return integrate(scenario.parameters, law, switches, x0, times, rtol=rtol)
+    return integrate(scenario.parameters, _law(control), switches, x0, times, rtol=rtol)
+
+
+def outputs(scenario: Scenario, times: Array, states: Array) -> Array:
+    """All outputs of car, road and controller in each row, from its time and states: what a co-simulation records."""
+    ground, motion = road_of(scenario.parameters), equations_of_motion(car_of(scenario.parameters))
+    law = _law(control_of(scenario.parameters))
+    rows = []
+    for t, x in zip(times.tolist(), states.tolist(), strict=True):
+        u, h, dh = law(t, x), ground.heights(t), ground.rates(t)
+        accelerations, travels, tyres = motion(x[:7], x[7:], u, h, dh)
+        rows.append((*h, *dh, *x, *accelerations, *travels, *tyres, *u))
+    return np.array(rows)
 
 
 def integrate(

@@ -45,46 +45,40 @@ class {model}(Fmi2Slave):
     def __init__(self, **kwargs):
         self.references.append(globals())
         super().__init__(**kwargs)
-        for i in range({inputs}):
-            setattr(self, f"u{{i}}", 0.0)
-            self.register_variable(Real(f"u{{i}}", causality=Fmi2Causality.input))
-        for i in range({outputs}):
-            setattr(self, f"y{{i}}", 0.0)
-            self.register_variable(Real(f"y{{i}}", causality=Fmi2Causality.output))
+        self.value = dict.fromkeys({inputs} + {outputs}, 0.0)
+        for name in {inputs}:
+            self.declare(name, Fmi2Causality.input)
+        for name in {outputs}:
+            self.declare(name, Fmi2Causality.output)
+
+    def declare(self, name, causality):
+        getter, setter = lambda: self.value[name], lambda value: self.value.__setitem__(name, value)
+        self.register_variable(Real(name, causality=causality, getter=getter, setter=setter), nested=False)
 
     def do_step(self, current_time, step_size):
         return True
 """
 
 
-def empty_system(folder: Path) -> Path:
-    """An .ssp wired like ours, of empty FMUs on our shell."""
+def empty_system(folder: Path, *, stock: bool) -> Path:
+    """An .ssp wired like ours, of empty FMUs: all PythonFMU's own code if `stock`, on our shell if not."""
+    folder.mkdir()
     contents = {"SystemStructure.ssd": (build.SYSTEM / "SystemStructure.ssd").read_bytes()}
-    for model, module in build.MODELS.items():
-        script = folder / f"empty_{model.lower()}.py"
-        script.write_text(SHELL.format(model=model, module=module))
-        fmu = _export(script, folder / f"{model}.fmu")
-        contents[f"resources/{model}.fmu"] = fmu.read_bytes()
+    for model in (RoadExcitation, Vehicle7DOF, LqrController):
+        name = model.__name__
+        script = folder / f"{folder.name}_{name.lower()}.py"
+        variables = {kind: [q.name for q in getattr(model, kind)] for kind in ("inputs", "outputs")}
+        template = STOCK if stock else SHELL
+        script.write_text(template.format(model=name, module=build.MODELS[name], **variables))
+        contents[f"resources/{name}.fmu"] = _export(script, folder / f"{name}.fmu").read_bytes()
     target = folder / "Empty.ssp"
     build.write_archive(target, contents)
     return target
 
 
-def stock_fmus(folder: Path) -> list[Path]:
-    """Three empty FMUs (road, vehicle, controller) with as many variables as ours, all PythonFMU's own code."""
-    fmus = []
-    for model in (RoadExcitation, Vehicle7DOF, LqrController):
-        script = folder / f"stock_{model.__name__.lower()}.py"
-        name = f"Stock{model.__name__}"
-        script.write_text(STOCK.format(model=name, inputs=len(model.inputs), outputs=len(model.outputs)))
-        fmus.append(_export(script, folder / f"{name}.fmu"))
-    return fmus
-
-
 def _export(script: Path, target: Path) -> Path:
     path = list(sys.path)
     try:
-        made = FmuBuilder.build_FMU(script, target, needsExecutionTool=False)
+        return Path(FmuBuilder.build_FMU(script, target, needsExecutionTool=False))
     finally:
         sys.path[:] = path
-    return Path(made)

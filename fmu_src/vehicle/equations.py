@@ -73,7 +73,8 @@ def equations_of_motion(car: Car, sin: Callable[..., Any] = math.sin, cos: Calla
         q_double_dot = (
             (F1 + F2) / m,  # (3.1)
             (roll * cos_cos - gyro * dphi) / Jx,  # (3.5)
-            ((b * F2 - a * F1) * cos_phi - roll * sin_sin + 2.0 * gyro * dpsi) / (Jy - Jy_Jz * sin_psi**2),  # (3.6)
+            ((b * F2 - a * F1) * cos_phi - roll * sin_sin + 2.0 * gyro * dpsi)
+            / (Jy - Jy_Jz * sin_psi * sin_psi),  # (3.6)
             (N11 - F11) / m11,  # (3.2)
             (N12 - F12) / m12,  # (3.3)
             (N21 + N22 - F2) / axle_mass,  # (3.4)
