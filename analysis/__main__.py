@@ -12,10 +12,9 @@ from pathlib import Path
 from fmu_src.quantities import ParameterError
 
 from .errors import CosimError, InputError
+from .files import write_whole
 from .scenario import Scenario, built_in_scenarios, read_scenario
-from .trajectory import Run, new_run_folder, read_run, write_run
-
-FINDINGS, COUNTERPART = "findings.json", "counterpart"
+from .trajectory import COUNTERPART, FINDINGS, Run, new_run_folder, read_run, write_run
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -104,9 +103,8 @@ def _judge(run: Run, folder: Path) -> int:
     from .check import check
 
     findings = check(run)
-    part = folder / f"{FINDINGS}.part"
-    part.write_text(json.dumps([f.as_json() for f in findings], indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
-    part.replace(folder / FINDINGS)
+    text = json.dumps([f.as_json() for f in findings], indent=1, ensure_ascii=False) + "\n"
+    write_whole(folder / FINDINGS, text.encode())
     for f in findings:
         verdict = "holds" if f.holds else "FAILS"
         print(f"{verdict}: {f.claim}: {f.measured:.3g} (wanted {f.expected:g} ± {f.tolerance:.2g}; {f.source})")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import base64
+import html
 import json
 import re
 from dataclasses import dataclass, fields
@@ -11,7 +12,6 @@ from typing import Any
 
 import numpy as np
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
-from markupsafe import Markup, escape
 
 from fmu_src.controller.lqr_controller import LqrController
 from fmu_src.quantities import CORNER_WORDS, CORNERS, PARAMETERS, STATES, TYRE_FORCES, Quantity
@@ -19,12 +19,15 @@ from fmu_src.road.profiles import HARMONICS
 from fmu_src.road.road_excitation import RoadExcitation
 from fmu_src.vehicle.vehicle7dof import Vehicle7DOF
 
-from . import figures
+from . import run_figures
 from .errors import InputError
+from .figures import READING, readable
+from .files import write_whole
 from .findings import Finding
-from .trajectory import RECORD, Array, Run, Trajectory, read_run
+from .trajectory import COUNTERPART, FINDINGS, RECORD, Run, Trajectory, read_run
+from .tyres import static_loads, time_below_zero, tyre_loads
 
-FINDINGS, COUNTERPART, REPORT = "findings.json", "counterpart", "report.html"
+REPORT = "report.html"
 TEMPLATE = "report.html"
 WORDS = {
     name: text
@@ -62,7 +65,7 @@ class Parameter:
 
     component: str
     name: str
-    symbol: Markup
+    symbol: str
     value: str
     unit: str
     text: str
@@ -80,7 +83,7 @@ def write_report(run_folder: Path) -> Path:
     if counterpart:
         _check_record(counterpart.record, there / RECORD)
     findings = read_findings(run_folder / FINDINGS)
-    entries = figures.draw_all(run, counterpart, run_folder)
+    entries = run_figures.draw_all(run, counterpart, run_folder)
     page = _template().render(
         title=run.record["scenario"].get("title") or run.record["scenario"].get("name") or "A run",
         summary=summary(run),
@@ -88,15 +91,15 @@ def write_report(run_folder: Path) -> Path:
         states=[extreme(run.trajectory, q) for q in STATES if q.name in run.trajectory.names],
         tyres=tyre_table(run),
         stop=float(run.trajectory.time[-1]),
-        figures=[(entry, _as_data(run_folder / figures.FOLDER / entry.file)) for entry in entries],
-        left_out=figures.left_out(run, counterpart),
+        figures=[(entry, _as_data(run_folder / run_figures.FOLDER / entry.file)) for entry in entries],
+        left_out=run_figures.left_out(run, counterpart),
         counterpart=counterpart is not None,
         parameters=parameter_table(run),
         fmus=run.record["fmus"],
         versions=run.record.get("versions", {}),
     )
     target = run_folder / REPORT
-    figures.write_whole(target, page.encode())
+    write_whole(target, page.encode())
     return target
 
 
@@ -105,7 +108,7 @@ def _template() -> Any:
     environment = Environment(
         loader=loader, autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
     )
-    environment.filters.update(number=figures.readable, symbol=symbol_html, unit=unit_text)
+    environment.filters.update(number=readable, symbol=symbol_html, unit=unit_text)
     return environment.get_template(TEMPLATE)
 
 
@@ -153,7 +156,7 @@ def _as_data(path: Path) -> str:
 def summary(run: Run) -> str:
     """The scenario in one line: road, speed, times, coupling, control."""
     scenario = run.record["scenario"]
-    (v0,) = figures.real_parameters(run, "v0")
+    (v0,) = run.reals("v0")
     times = f"{run.trajectory.time[0]:g} s to {run.trajectory.time[-1]:g} s"
     if isinstance(scenario.get("step"), (int, float)):
         times += f" in steps of {1e3 * scenario['step']:g} ms"
@@ -163,15 +166,15 @@ def summary(run: Run) -> str:
 
 def control_words(run: Run) -> str:
     """Whether the controller is on, with which horizon, and from when."""
-    if not figures.is_controlled(run):
+    if not run_figures.is_controlled(run):
         return "controller off"
     known = run.parameters
     horizon = f"{known.get('horizon', 'unknown')} horizon"
     if known.get("horizon") == "finite":
-        horizon += ", T = {:g} s".format(*figures.real_parameters(run, "T"))
+        horizon += ", T = {:g} s".format(*run.reals("T"))
     begin = "the come-down of the last wheel"
     if known.get("activation") == "at t_on":
-        begin = "t = {:g} s".format(*figures.real_parameters(run, "t_on"))
+        begin = "t = {:g} s".format(*run.reals("t_on"))
     return f"controller on ({horizon}, from {begin})"
 
 
@@ -181,9 +184,9 @@ def road_words(run: Run) -> str:
     profile = known.get("profile", "not recorded")
     if profile == "flat":
         return "flat road"
-    A, Lambda = figures.real_parameters(run, "A", "Lambda")
+    A, Lambda = run.reals("A", "Lambda")
     names = [name for name in HARMONICS if known.get(name)]
-    series = zip(names, figures.real_parameters(run, *names), strict=True)
+    series = zip(names, run.reals(*names), strict=True)
     what = {
         "bump": f"half-sine bump, {1e3 * A:g} mm high and {Lambda / 2:g} m long",
         "sine": f"endless sine road, amplitude {1e3 * A:g} mm, wave length {Lambda:g} m",
@@ -196,7 +199,7 @@ def road_words(run: Run) -> str:
 
 def extreme(trajectory: Trajectory, q: Quantity) -> Extreme:
     """What there is to say of one state, in the unit in which it is read."""
-    unit, factor = figures.READING[q.unit]
+    unit, factor = READING[q.unit]
     values = factor * trajectory[q.name]
     row = int(np.argmax(np.abs(values)))
     at = float(trajectory.time[row])
@@ -208,19 +211,11 @@ def tyre_table(run: Run) -> list[TyreLoad]:
     if not {q.name for q in TYRE_FORCES} <= set(run.trajectory.names):
         return []
     time, table = run.trajectory.time, []
-    for words, static, load in zip(CORNER_WORDS, figures.static_loads(run), figures.tyre_loads(run).T, strict=True):
+    for words, static, load in zip(CORNER_WORDS, static_loads(run), tyre_loads(run).T, strict=True):
         row = int(np.argmin(load))
         lost = time_below_zero(time, load)
         table.append(TyreLoad(words=words, static=static, smallest=load[row], time=time[row], lost=lost))
     return table
-
-
-def time_below_zero(time: Array, values: Array) -> float:
-    """How long [s] the straight lines between the samples run below zero."""
-    low, high = np.minimum(values[:-1], values[1:]), np.maximum(values[:-1], values[1:])
-    level = (low < 0.0).astype(float)  # share of an interval in which nothing changes
-    share = np.divide(-low, high - low, out=level, where=high > low).clip(0.0, 1.0)
-    return float(np.sum(share * np.diff(time)))
 
 
 def parameter_table(run: Run) -> list[Parameter]:
@@ -233,7 +228,7 @@ def parameter_table(run: Run) -> list[Parameter]:
                 Parameter(
                     component=component,
                     name=name,
-                    symbol=symbol_html(q.symbol) if q else Markup(""),
+                    symbol=symbol_html(q.symbol) if q else "",
                     value=exact(value),
                     unit=unit_text(q.unit) if q else "",
                     text=q.text if q else WORDS.get(name, ""),
@@ -252,13 +247,13 @@ def exact(value: float | str | bool) -> str:
     return str(value)
 
 
-def symbol_html(latex: str) -> Markup:
+def symbol_html(latex: str) -> str:
     r"""HTML of the LaTeX of a symbol in the table: Greek letters, \dot and \ddot on one letter, indices."""
-    text = re.sub(r"\\([A-Za-z]+)", lambda m: GREEK.get(m[1], m[0]), str(escape(latex)))
+    text = re.sub(r"\\([A-Za-z]+)", lambda m: GREEK.get(m[1], m[0]), html.escape(latex))
     text = re.sub(r"\\(d+)ot\{(\w)\}", lambda m: m[2] + {"d": "\u0307", "dd": "\u0308"}[m[1]], text)
     text = re.sub(r"_(\w)", r"<sub>\1</sub>", text)
     text = re.sub(r"_\{(.*)\}", r"<sub>\1</sub>", text)
-    return Markup(f"<var>{text}</var>")
+    return f"<var>{text}</var>"
 
 
 def unit_text(unit: str) -> str:

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from .errors import InputError
 
 Array = NDArray[np.float64]
-CSV, RECORD = "trajectory.csv", "run.json"
+CSV, RECORD, FINDINGS, COUNTERPART = "trajectory.csv", "run.json", "findings.json", "counterpart"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -51,6 +51,14 @@ class Run:
     def parameters(self) -> dict[str, float | str | bool]:
         """Every parameter of every component by name (components that share a name share the value)."""
         return {name: value for values in self.record["parameters"].values() for name, value in values.items()}
+
+    def reals(self, *names: str) -> list[float]:
+        """Real parameters by name, SI units. Raises InputError naming those that the record lacks."""
+        known = self.parameters
+        lacking = [name for name in names if not isinstance(known.get(name), int | float)]
+        if lacking:
+            raise InputError(f"{RECORD}: parameters: wanted a number for {', '.join(lacking)}, got none")
+        return [float(known[name]) for name in names]
 
 
 def write_csv(trajectory: Trajectory, path: Path) -> None:

@@ -1,4 +1,4 @@
-"""Figures and report of a small made-up run: what they show, that they repeat to the byte, and what they refuse."""
+"""Report of a small made-up run: its numbers, that it repeats to the byte, and what it refuses."""
 
 from __future__ import annotations
 
@@ -10,20 +10,16 @@ from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
 
-import matplotlib
 import numpy as np
 import pytest
-from matplotlib.figure import Figure
+from made_up_run import CAR, EVERYTHING, ROAD_NAMES, made_up_run
 
-from analysis import figures, report
+from analysis import report, run_figures, tyres
 from analysis.errors import InputError
 from analysis.findings import Finding
 from analysis.trajectory import Run, Trajectory, write_run
-from fmu_src.quantities import ACCELERATIONS, FORCES, PARAMETERS, ROAD, STATES, STRUT_TRAVELS, TABLE, TYRE_FORCES
+from fmu_src.quantities import PARAMETERS, STATES, TABLE, TYRE_FORCES
 
-CAR = ("m", "m11", "m12", "m21", "m22", "m2", "a", "b")
-ROAD_NAMES = ("A", "Lambda", "v0", "tau0")
-EVERYTHING = tuple(q.name for q in (*ROAD, *STATES, *ACCELERATIONS, *STRUT_TRAVELS, *TYRE_FORCES, *FORCES))
 FINDING = Finding(
     claim="d(T + U)/dt <= 0 & nothing else",
     equation="(3.1)",
@@ -33,36 +29,6 @@ FINDING = Finding(
     unit="m/s2",
     source="trajectory.csv",
 )
-
-
-def made_up_run(
-    names: tuple[str, ...] = EVERYTHING, *, enabled: bool = False, title: str = "A bump", n: int = 201
-) -> Run:
-    """Decaying waves of 10 mm or mrad for the states, half-sine bumps for the road, forces if enabled; 0 to 2 s."""
-    time = np.linspace(0.0, 2.0, n)
-    columns = {}
-    for number, name in enumerate(names):
-        wave = np.sin(20.0 * time + number) * np.exp(-5.0 * time)
-        columns[name] = {"N": 1000.0}.get(TABLE[name].unit, 0.01) * wave
-    for name, delay in zip(("h_fl", "h_fr", "h_rl", "h_rr"), (0.0, 0.02, 0.25, 0.27), strict=True):
-        s = time - delay
-        columns[name] = np.where((s > 1e-9) & (s < 0.05 - 1e-9), 0.01 * np.sin(np.pi * s / 0.05), 0.0)
-    for q in FORCES:
-        columns[q.name] = 100.0 * np.exp(-time) if enabled else 0.0 * time
-    trajectory = Trajectory(time=time, names=names, values=np.column_stack([columns[name] for name in names]))
-    parameters = {
-        "road": {"profile": "bump", **{name: PARAMETERS[name].start for name in ROAD_NAMES}, "excite_fl": True},
-        "vehicle": {name: PARAMETERS[name].start for name in CAR},
-        "controller": {"lambda": 1e10, "T": 2.3, "horizon": "finite", "activation": "come-down", "enabled": enabled},
-    }
-    record = {
-        "format": 1,
-        "scenario": {"name": "bump", "title": title, "step": 0.01, "coupling": "gauss-seidel"},
-        "parameters": parameters,
-        "fmus": {"vehicle": {"file": "Vehicle7DOF.fmu", "sha256": "5ha256", "guid": "9u1d"}},
-        "versions": {"numpy": "2.4.6"},
-    }
-    return Run(trajectory=trajectory, record=record)
 
 
 def written(run: Run, folder: Path, *, counterpart: Run | None = None, findings: Any = None) -> Path:
@@ -116,117 +82,22 @@ def full(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return report.write_report(folder)
 
 
-# ------------------------------------------------------------------ figures
-def test_each_figure_names_its_number_in_the_paper(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(figures, "render", lambda subject: b"")
-    run, controlled = made_up_run(), made_up_run(enabled=True)
-
-    def numbers(run: Run, counterpart: Run | None) -> list[str]:
-        entries = figures.draw_all(run, counterpart, tmp_path)
-        assert all((tmp_path / "figures" / entry.file).is_file() for entry in entries)
-        return [entry.caption.split(" of the paper")[0].split(".")[0] for entry in entries]
-
-    always = [f"As figure {number}" for number in (2, 3, 4, 5, 6)]
-    assert numbers(run, None) == [*always, "Not in the paper"]
-    assert numbers(controlled, None) == [*always, "As figure 10", "Not in the paper"]
-    assert (
-        numbers(run, controlled)
-        == numbers(controlled, run)
-        == [*always, "As figure 9", "As figure 10", "Not in the paper"]
-    )
-    assert numbers(run, run) == numbers(run, None)  # a counterpart that is none
-
-
-def test_the_comparison_draws_the_controlled_car_in_red_whichever_run_it_is() -> None:
-    run, controlled = made_up_run(), made_up_run(enabled=True)
-    controlled.trajectory.values[:] *= 2.0
-    for pair in ((run, controlled), (controlled, run)):
-        subject = next(s for s in figures.subjects(*pair) if "09" in s.file)
-        for panel, name in zip(subject.panels, ("body.heave", "body.pitch", "body.roll"), strict=True):
-            red, blue = panel(Figure().subplots()).get_lines()
-            assert (red.get_color(), blue.get_color()) == (figures.RED, figures.BLUE)
-            np.testing.assert_allclose(red.get_ydata(), 1e3 * controlled.trajectory[name])
-            np.testing.assert_allclose(blue.get_ydata(), 1e3 * run.trajectory[name])
-
-
-def test_the_same_data_give_the_same_bytes_whatever_style_the_user_has_set() -> None:
-    subject = figures.subjects(made_up_run(), None)[4]
-    before = dict(matplotlib.rcParams)
-    image = figures.render(subject)
-    assert dict(matplotlib.rcParams) == before
-    with matplotlib.rc_context({"lines.linewidth": 9.0, "xtick.color": "red", "svg.fonttype": "none"}):
-        assert figures.render(figures.subjects(made_up_run(), None)[4]) == image
-    root = ElementTree.fromstring(image)
-    assert root.tag.endswith("svg") and not any(e.tag.endswith(("text", "date")) for e in root.iter())
-
-
-def test_labels_come_from_the_table_and_values_are_in_their_unit() -> None:
-    trajectory = made_up_run().trajectory
-    ax = Figure().subplots()
-    assert figures.plot_quantities(trajectory, STATES[3:5], ax) is ax
-    assert (ax.get_xlabel(), ax.get_ylabel()) == ("$t$ [s]", "$z_{11}$, $z_{12}$ [mm]")
-    np.testing.assert_allclose(ax.get_lines()[0].get_ydata(), 1e3 * trajectory["wheel_fl.heave"])
-    assert [text.get_text() for text in ax.get_legend().get_texts()] == [
-        "$z_{11}$ front left wheel heave",
-        "$z_{12}$ front right wheel heave",
-    ]
-
-
-def test_the_excitations_are_shown_where_the_road_is_not_flat() -> None:
-    trajectory = made_up_run().trajectory
-    assert figures.uneven(trajectory, wave=0.1) == pytest.approx((0.0, 0.4))
-    endless = replace(trajectory, names=EVERYTHING, values=np.sin(20 * np.pi * trajectory.time)[:, None] * np.ones(66))
-    assert figures.uneven(endless, wave=0.1) == pytest.approx((0.0, 0.5))  # four waves and a quarter
-    assert figures.uneven(replace(trajectory, values=0.0 * trajectory.values), wave=0.1) == (0.0, 2.0)
-
-
-def test_time_axes_end_a_quarter_after_all_has_settled() -> None:
-    time = np.linspace(0.0, 10.0, 1001)
-    values = np.where(time < 2.0, np.cos(time), 3.0)
-    trajectory = Trajectory(time=time, names=("body.heave",), values=values[:, None])
-    assert figures.eventful([trajectory], STATES[:1]) == pytest.approx((0.0, 2.5))
-    still = replace(trajectory, values=np.ones((1001, 1)))
-    assert figures.eventful([trajectory, still], STATES[:1]) == (0.0, 10.0)
-
-
-def test_a_long_run_gives_a_small_figure_that_keeps_its_peaks() -> None:
-    n = 200_001
-    time = np.linspace(0.0, 200.0, n)
-    values = np.sin(60.0 * time)
-    values[123_457], values[150_001] = 5.0, -4.0
-    (line,) = Figure().subplots().plot(time, values)
-    figures.thin(line, (0.0, 200.0))
-    x, y = (np.asarray(each) for each in line.get_data())
-    assert len(x) == 2 * figures.COLUMNS
-    assert (y.max(), y.min()) == (5.0, -4.0)
-    assert x[y.argmax()] == pytest.approx(time[123_457], abs=200.0 / figures.COLUMNS)
-
-
-def test_where_the_displacements_end_is_said_beside_the_papers_shift() -> None:
-    run = made_up_run()
-    four = figures.subjects(run, None)[2]
-    assert f"body heave {figures.readable(1e3 * run.trajectory['body.heave'][-1], 2)} mm" in four.caption()
-    assert "vibrational shift" in four.caption()
-    run.trajectory.values[-1, EVERYTHING.index("h_rr")] = 0.01  # the road does not end level: nothing to compare
-    assert "vibrational shift" not in four.caption()
-
-
 # ------------------------------------------------------------------ numbers
 def test_static_loads_carry_the_car() -> None:
     run = made_up_run()
-    loads = figures.static_loads(run)
+    loads = tyres.static_loads(run)
     mass = sum(PARAMETERS[name].start for name in ("m", "m11", "m12", "m21", "m22", "m2"))
     assert loads.sum() == pytest.approx(9.81 * mass)
     assert loads[0] == pytest.approx(9.81 * (870.0 * 1.5 / 5.0 + 30.0)) and loads[0] == loads[1]
-    shifted = figures.tyre_loads(run) - run.trajectory.columns([q.name for q in TYRE_FORCES])
+    shifted = tyres.tyre_loads(run) - run.trajectory.columns([q.name for q in TYRE_FORCES])
     np.testing.assert_allclose(shifted, np.tile(loads, (201, 1)))
 
 
 def test_loss_of_contact_is_timed_between_the_samples() -> None:
     time = np.array([0.0, 1.0, 2.0, 4.0, 5.0])
-    assert report.time_below_zero(time, np.array([3.0, -1.0, -1.0, 1.0, 0.0])) == pytest.approx(0.25 + 1.0 + 1.0)
-    assert report.time_below_zero(time, -np.ones(5)) == 5.0
-    assert report.time_below_zero(time, np.zeros(5)) == 0.0
+    assert tyres.time_below_zero(time, np.array([3.0, -1.0, -1.0, 1.0, 0.0])) == pytest.approx(0.25 + 1.0 + 1.0)
+    assert tyres.time_below_zero(time, -np.ones(5)) == 5.0
+    assert tyres.time_below_zero(time, np.zeros(5)) == 0.0
 
 
 def test_extremes_are_signed_and_timed() -> None:
@@ -288,7 +159,7 @@ def test_the_page_says_what_was_simulated_and_how_to_repeat_it(full: Path) -> No
 
 
 def test_a_lost_contact_is_reported(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(figures, "render", lambda subject: b"")
+    monkeypatch.setattr(run_figures, "render", lambda subject: b"")
     run = made_up_run()
     assert "lost" not in Page(report.write_report(written(run, tmp_path / "kept"))).text
     run.trajectory.values[100:111, EVERYTHING.index("tyre_rr.force")] = -1e5

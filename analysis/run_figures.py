@@ -1,0 +1,186 @@
+"""Which figures a run has: the paper's figures 2 to 6, 9 and 10, and the tyre loads, with their captions."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from pathlib import Path
+
+from fmu_src.quantities import CORNER_WORDS, FORCES, POSITIONS, ROAD_HEIGHTS, TYRE_FORCES, Quantity
+
+from .figures import (
+    READING,
+    Axes,
+    Subject,
+    Window,
+    plot_comparison,
+    plot_heaves,
+    plot_quantities,
+    plot_tyre_loads,
+    readable,
+    render,
+    uneven,
+    words,
+)
+from .files import write_whole
+from .trajectory import Run, Trajectory
+from .tyres import static_loads, tyre_loads
+
+FOLDER = "figures"
+Z, PSI, PHI, Z11, Z12, Z2, PSI2 = POSITIONS
+
+
+@dataclass(frozen=True, slots=True)
+class FigureEntry:
+    """A figure that was drawn: its file in the figures' folder, its title, its caption (plain text)."""
+
+    file: str
+    title: str
+    caption: str
+
+
+def draw_all(run: Run, counterpart: Run | None, folder: Path) -> list[FigureEntry]:
+    """Write `figures/*.svg` into the run's folder: all figures whose columns were recorded."""
+    target = folder / FOLDER
+    target.mkdir(exist_ok=True)
+    drawn = [subject for subject in subjects(run, counterpart) if not subject.missing]
+    for subject in drawn:
+        write_whole(target / subject.file, render(subject))
+    return [FigureEntry(subject.file, subject.title, subject.caption()) for subject in drawn]
+
+
+def left_out(run: Run, counterpart: Run | None) -> list[tuple[str, list[str]]]:
+    """Titles of the figures that cannot be drawn, each with the columns that were not recorded."""
+    return [(subject.title, subject.missing) for subject in subjects(run, counterpart) if subject.missing]
+
+
+# ------------------------------------------------------------------ the choice
+def is_controlled(run: Run) -> bool:
+    """Whether the controller of this run is switched on."""
+    return bool(run.record["parameters"].get("controller", {}).get("enabled", False))
+
+
+def subjects(run: Run, counterpart: Run | None) -> list[Subject]:
+    """All figures that this run can give; the controller's, if it or its counterpart has one at work."""
+    pair = {is_controlled(each): each.trajectory for each in (run, counterpart) if each}
+    made = _paper_figures(run)
+    if len(pair) == 2:
+        made.append(_comparison(pair[True], pair[False]))
+    if True in pair and _acts(pair[True]):
+        made.append(_strut_forces(pair[True], "" if is_controlled(run) else " They are those of the counterpart run."))
+    return [*made, _tyre_loads(run)]
+
+
+def _paper_figures(run: Run) -> list[Subject]:
+    def subject(
+        number: int,
+        name: str,
+        title: str,
+        text: str,
+        needs: Sequence[Quantity],
+        plot: Callable[[Trajectory, Sequence[Quantity], Axes], Axes] = plot_quantities,
+    ) -> Subject:
+        return Subject(
+            file=f"figure-{number:02d}-{name}.svg",
+            title=title,
+            caption=lambda: (
+                f"As figure {number} of the paper. {text}" + (_shift(run, needs) if number in (3, 4) else "")
+            ),
+            panels=(partial(plot, run.trajectory, needs),),
+            sources=(run.trajectory,),
+            needs=needs,
+        )
+
+    road = (
+        "Height of the road under each wheel, where it is not flat (of an endless road the first waves). "
+        "A wheel meets the profile after its own delay, if the profile lies in its track."
+    )
+    wheels = "Up, from static equilibrium."
+    heaves = "Body and rear axle, up, from static equilibrium; the front wheels of figure 3 lightly."
+    angles = "Roll ψ, positive where the left side goes up, and pitch φ, positive nose down."
+    excitations = subject(2, "excitations", "Excitations on all wheels", road, ROAD_HEIGHTS)
+    return [
+        replace(excitations, window=partial(_road_window, run)),
+        subject(3, "front-wheels", "Vertical displacements of the front wheels", wheels, (Z11, Z12)),
+        subject(4, "heaves", "Vertical displacements", heaves, (Z, Z2, Z11, Z12), plot_heaves),
+        subject(5, "car-rotation", "Car rotation angles", angles, (PSI, PHI)),
+        subject(6, "axle-rotation", "Rotation angle of the rear axle", "Roll ψ₂, positive like ψ.", (PSI2,)),
+    ]
+
+
+def _road_window(run: Run) -> Window:
+    Lambda, v0 = run.reals("Lambda", "v0")
+    return uneven(run.trajectory, Lambda / v0)
+
+
+def _shift(run: Run, quantities: Sequence[Quantity]) -> str:
+    """Where the displacements end, beside what the paper says of it; only for a road that ends as level as it began."""
+    trajectory = run.trajectory
+    if not {q.name for q in ROAD_HEIGHTS} <= set(trajectory.names):
+        return ""
+    heights = trajectory.columns([q.name for q in ROAD_HEIGHTS])
+    if heights[-2:].any() or not heights.any():
+        return ""
+    unit, factor = READING["m"]
+    ends = ", ".join(f"{words(q)} {readable(factor * trajectory[q.name][-1], 2)} {unit}" for q in quantities)
+    return (
+        " The paper reads from its figures 3 and 4 that the displacements remain constant behind the unevenness "
+        f"(“vibrational shift”). Here, at t = {trajectory.time[-1]:g}\N{NO-BREAK SPACE}s: {ends}."
+    )
+
+
+def _acts(trajectory: Trajectory) -> bool:
+    """Whether any recorded control force is ever other than zero; True if one was not recorded."""
+    names = [q.name for q in FORCES]
+    return not set(names) <= set(trajectory.names) or bool(trajectory.columns(names).any())
+
+
+def _comparison(controlled: Trajectory, uncontrolled: Trajectory) -> Subject:
+    return Subject(
+        file="figure-09-stabilization.svg",
+        title="Controlled against uncontrolled car",
+        caption=lambda: (
+            "As figure 9 of the paper. Red: optimal stabilization; blue: without control forces. Heave z, up; pitch φ, "
+            "positive nose down (the paper's section 4 has it front up); below them roll ψ, which the controller does "
+            "not see. Here the car is the full one, with seven degrees of freedom; the paper's is the half car."
+        ),
+        panels=[partial(plot_comparison, controlled, uncontrolled, q) for q in (Z, PHI, PSI)],
+        sources=(controlled, uncontrolled),
+        needs=(Z, PHI, PSI),
+    )
+
+
+def _strut_forces(trajectory: Trajectory, whose: str) -> Subject:
+    return Subject(
+        file="figure-10-control-forces.svg",
+        title="Control forces of the struts",
+        caption=lambda: (
+            "As figure 10 of the paper, by strut: positive pushes the body up and the wheel down. The paper's forces, "
+            f"per axle and positive down on the body, are u₁ = −(u₁₁ + u₁₂) and u₂ = −(u₂₁ + u₂₂).{whose}"
+        ),
+        panels=(partial(plot_quantities, trajectory, FORCES),),
+        sources=(trajectory,),
+        needs=FORCES,
+    )
+
+
+def _tyre_loads(run: Run) -> Subject:
+    def caption() -> str:
+        loads = ", ".join(f"{w} {1e-3 * load:.3g} kN" for w, load in zip(CORNER_WORDS, static_loads(run), strict=True))
+        return (
+            f"Not in the paper. Vertical load of each tyre: its static load ({loads}) and the tyre force over it. "
+            "Below zero a real tyre has left the ground, while the model's tyre spring goes on pulling."
+        )
+
+    def axle(pair: slice, ax: Axes) -> Axes:
+        return plot_tyre_loads(run.trajectory.time, tyre_loads(run)[:, pair], TYRE_FORCES[pair], ax)
+
+    return Subject(
+        file="tyre-loads.svg",
+        title="Tyre loads",
+        caption=caption,
+        panels=(partial(axle, slice(0, 2)), partial(axle, slice(2, 4))),
+        sources=(run.trajectory,),
+        needs=TYRE_FORCES,
+    )

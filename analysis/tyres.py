@@ -1,0 +1,31 @@
+"""Vertical loads of the tyres, and how long a tyre is without one."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fmu_src.quantities import TYRE_FORCES
+
+from .trajectory import Array, Run
+
+G = 9.81  # m/s2
+
+
+def static_loads(run: Run) -> Array:
+    """Loads (4) [N] of the tyres fl, fr, rl, rr of the car at rest: its share of the body, its wheel, half the beam."""
+    m, m11, m12, m21, m22, m2, a, b = run.reals("m", "m11", "m12", "m21", "m22", "m2", "a", "b")
+    front, rear = m * b / (2 * (a + b)), m * a / (2 * (a + b)) + m2 / 2
+    return G * np.array([front + m11, front + m12, rear + m21, rear + m22])
+
+
+def tyre_loads(run: Run) -> Array:
+    """Total vertical loads (n, 4) [N] of the tyres: static load and exported tyre force."""
+    return static_loads(run) + run.trajectory.columns([q.name for q in TYRE_FORCES])
+
+
+def time_below_zero(time: Array, values: Array) -> float:
+    """How long [s] the straight lines between the samples run below zero."""
+    low, high = np.minimum(values[:-1], values[1:]), np.maximum(values[:-1], values[1:])
+    level = (low < 0.0).astype(float)  # share of an interval in which nothing changes
+    share = np.divide(-low, high - low, out=level, where=high > low).clip(0.0, 1.0)
+    return float(np.sum(share * np.diff(time)))
