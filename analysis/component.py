@@ -113,7 +113,7 @@ class Component:
             function(*arguments, **keywords)
         except Exception as error:  # fmpy raises FMICallException, and bare Exceptions
             self._usable = False
-            raise CosimError(f"{self.name}: {error}{self._said()}") from error
+            raise CosimError(f"{self.name}: {str(error).rstrip('.')}{self._said()}") from error
 
     def fail(self, doing: str, t: float, status: int) -> NoReturn:
         """Raise CosimError for a status that a direct call returned."""
@@ -122,7 +122,8 @@ class Component:
         raise CosimError(f"{self.name}: {doing} at t = {t:g} s: status {status} ({word}){self._said()}")
 
     def _said(self) -> str:
-        return f"; it said: {' | '.join(self.log[-3:])}" if self.log else "; it said nothing"
+        own = [message for message in self.log if not message.startswith("Fatal py exception")] or self.log
+        return f"; it said: {' | '.join(own[-3:])}" if own else "; it said nothing"
 
     def free(self) -> None:
         """Terminate, unless a call has failed (a second failure can end a PythonFMU host), and free the instance."""

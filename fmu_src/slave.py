@@ -1,18 +1,31 @@
-"""Base of the three slaves: variables declared from the table, fast access by value reference, XML, refusals."""
+"""Base of the three slaves: variables from the table, fast access by reference, refusals, the whole state."""
 
 from __future__ import annotations
 
+import ctypes
+import json
 from collections.abc import Iterable, Sequence
+from dataclasses import asdict
 from functools import partial
-from typing import ClassVar
-from xml.etree.ElementTree import Element, SubElement
+from math import isfinite
+from typing import Any, ClassVar
+from xml.etree.ElementTree import Element
 
-from pythonfmu import Boolean, DefaultExperiment, Fmi2Causality, Fmi2Initial, Fmi2Slave, Fmi2Variability, Real, String
+from pythonfmu import (
+    Boolean,
+    DefaultExperiment,
+    Fmi2Causality,
+    Fmi2Initial,
+    Fmi2Slave,
+    Fmi2Variability,
+    Integer,
+    Real,
+    String,
+)
 from pythonfmu.enums import Fmi2Status
 
-from .quantities import PARAMETERS, UNITS, Choice, ParameterError, Quantity, refuse
-
-RELEASED = "2026-11-22T00:00:00Z"  # of the version in pyproject.toml, not of the build: same sources, same bytes
+from .description import LOG_CATEGORIES, completed
+from .quantities import PARAMETERS, Choice, ParameterError, Quantity, refuse
 
 
 class StepError(Exception):
@@ -36,6 +49,7 @@ class Slave(Fmi2Slave):
     guid: object
     identity: ClassVar[str] = ""  # hash of the code, set by the slave script of an exported FMU
 
+    log_categories = LOG_CATEGORIES
     author = "Bertolino–Bakša stability of motor vehicles: the developers"
     license = "MIT"
     copyright = "© the developers"
@@ -54,10 +68,10 @@ class Slave(Fmi2Slave):
         self._stale = True  # outputs are older than inputs, parameters or start values
         self._running = False
         self._failed = False
+        self._reals: dict[int, tuple[list[float], int]] = {}  # where the value of each reference lies
         self._register()
 
     def _register(self) -> None:
-        self._cells: list[tuple[list, int]] = []
         parameter = {"causality": Fmi2Causality.parameter, "variability": Fmi2Variability.fixed}
         for i, q in enumerate(self.inputs):
             self._declare(Real, q, self.u, i, causality=Fmi2Causality.input)
@@ -78,7 +92,8 @@ class Slave(Fmi2Slave):
         getter, setter = partial(cells.__getitem__, index), partial(cells.__setitem__, index)
         variable = kind(what.name, description=what.description, getter=getter, setter=setter, **attributes)
         self.register_variable(variable)
-        self._cells.append((cells, index))
+        if kind is Real:
+            self._reals[variable.value_reference] = (cells, index)
 
     # ------------------------------------------------------------------ what a subclass does
     def configure(self) -> None:
@@ -88,123 +103,233 @@ class Slave(Fmi2Slave):
         """Take the state from start values and inputs at `self.time`."""
 
     def advance(self, t: float, step: float) -> None:
-        """Make a step from t to t + step [s]; raise StepError, with the state untouched, if that cannot be done."""
+        """Make a step from t to t + step [s], step > 0; raise StepError if that cannot be done."""
         raise NotImplementedError
 
     def feed_through(self) -> None:
         """Renew those outputs that depend on inputs directly."""
 
+    def memory(self) -> list[Any]:
+        """What the component remembers beyond its variables and its time, as plain data; lists in it never change."""
+        return []
+
+    def recall(self, memory: list[Any]) -> None:
+        """Take back what `memory` gave."""
+
     def parameters(self) -> dict[str, float]:
         """Real parameters by name."""
         return dict(zip(self.reals, self.p, strict=True))
 
-    # ------------------------------------------------------------------ FMI calls
+    # ------------------------------------------------------------------ FMI calls: values
     def get_real(self, vrs: list[int]) -> list[float]:
         """Values by reference; all outputs at once take no loop."""
         if self._stale:
             self._refresh()
         if vrs == self._output_refs:
             return self.y
-        cells = self._cells
-        return [float(where[i]) for where, i in (cells[vr] for vr in vrs)]
+        try:
+            return [cells[i] for cells, i in map(self._reals.__getitem__, vrs)]
+        except KeyError:
+            return [float(value) for value in self._read(vrs, Real)]
+
+    def get_integer(self, vrs: list[int]) -> list[int]:
+        return [int(value) for value in self._read(vrs, Integer)]
+
+    def get_boolean(self, vrs: list[int]) -> list[bool]:
+        return [bool(value) for value in self._read(vrs, Boolean)]
+
+    def get_string(self, vrs: list[int]) -> list[str]:
+        return [str(value) for value in self._read(vrs, String)]
 
     def set_real(self, vrs: list[int], values: Sequence[float]) -> None:
         """Set values by reference; all inputs at once take no loop."""
-        self._stale = True
         if vrs == self._input_refs:
+            self._stale = True
             self.u[:] = values
-            return
-        cells = self._cells
-        for vr, value in zip(vrs, values, strict=True):
-            where, i = cells[vr]
-            where[i] = value
+        else:
+            self._write(vrs, values, Real)
 
+    def set_integer(self, vrs: list[int], values: Sequence[int]) -> None:
+        self._write(vrs, values, Integer)
+
+    def set_boolean(self, vrs: list[int], values: Sequence[bool]) -> None:
+        self._write(vrs, values, Boolean)
+
+    def set_string(self, vrs: list[int], values: Sequence[str]) -> None:
+        self._write(vrs, values, String)
+
+    def _read(self, vrs: list[int], kind: type) -> list[Any]:
+        unknown = [vr for vr in vrs if not isinstance(self.vars.get(vr), kind)]
+        if unknown:
+            self._refuse(f"reading {kind.__name__} variables: there are none of value reference {unknown}")
+            return [0] * len(vrs)
+        return [self.vars[vr].getter() for vr in vrs]
+
+    def _write(self, vrs: list[int], values: Sequence[Any], kind: type) -> None:
+        faults = [fault for vr, value in zip(vrs, values, strict=True) if (fault := self._unsettable(vr, value, kind))]
+        if faults:
+            self._refuse("; ".join(faults))
+            return
+        self._stale = True
+        for vr, value in zip(vrs, values, strict=True):
+            self.vars[vr].setter(value)
+
+    def _unsettable(self, vr: int, value: object, kind: type) -> str | None:
+        """Why this variable cannot be set to this value now; None if it can."""
+        variable: Any = self.vars.get(vr)
+        known = isinstance(variable, kind)
+        if not known:
+            return f"setting {kind.__name__} variables: there is none of value reference {vr}"
+        if variable.causality == Fmi2Causality.input:
+            return None
+        if variable.causality == Fmi2Causality.output and variable.initial != Fmi2Initial.exact:
+            return f"setting {variable.name} = {value!r}: it is an output"
+        if self._running:
+            return f"setting {variable.name} = {value!r}: wanted before the end of initialization"
+        return None
+
+    # ------------------------------------------------------------------ FMI calls: time
     def setup_experiment(self, start_time: float, *_: object) -> None:
         """Take the start time [s]."""
         self.time = start_time
 
     def exit_initialization_mode(self) -> None:
         """Check all parameters and start values; refuse with every fault named."""
+        if self._failed or self._running:
+            return
         try:
-            refuse(q.fault(x) for q, x in zip(self.outputs[: self.settable], self.y, strict=False))
+            refuse([q.fault(x) for q, x in zip(self.outputs[: self.settable], self.y, strict=False)])
+            refuse(None if isfinite(x) else f"{q.name} = {x!r} {q.unit}" for q, x in self._inputs())
+            refuse([] if isfinite(self.time) else [f"start time = {self.time!r} s: wanted a finite time"])
             self.configure()
             self.begin()
             self.feed_through()
-        except ParameterError:
-            self._failed = True
-            raise
+            refuse(None if isfinite(x) else f"{q.name} = {x!r} {q.unit} at the start" for q, x in self._outputs())
+        except (ParameterError, ArithmeticError, ValueError) as error:
+            self._refuse(f"initialization: {error}")
+            return
         self._running, self._stale = True, False
 
     def do_step(self, current_time: float, step_size: float) -> bool:
-        """One communication step; False (fmi2Discard) and a message in the log where it is refused."""
+        """One communication step; where it is refused False (fmi2Discard), a message, and the last good state."""
         if self._failed:
             return False
+        if not self._running:
+            return self._discard("a step was asked for outside of initialized time")
+        kept = (self.memory(), self.y[:], self.time)
         try:
-            self.advance(current_time, step_size)
-        except StepError as refusal:
-            self.log(f"{self.instance_name}: {refusal}", Fmi2Status.error, "logStatusError")
-            return False
-        self.time = current_time + step_size
-        self._stale = False
+            self._check_step(current_time, step_size)
+            if step_size > 0.0:
+                self.advance(current_time, step_size)
+            elif self._stale:
+                self.feed_through()
+            if not isfinite(sum(self.y)):
+                refuse(None if isfinite(x) else f"{q.name} = {x!r} {q.unit}" for q, x in self._outputs())
+        except (StepError, ArithmeticError, ValueError) as error:
+            memory, self.y[:], self.time = kept
+            self.recall(memory)
+            what = f"step of {step_size:g} s from t = {current_time:g} s: {error}"
+            return self._discard(f"{what}; the state at t = {self.time:g} s is kept")
+        self.time, self._stale = current_time + step_size, False
         return True
 
+    def terminate(self) -> None:
+        """No steps from now on."""
+        self._running = False
+
+    def _check_step(self, t: float, step: float) -> None:
+        if not (isfinite(t) and 0.0 <= step < float("inf")):
+            raise StepError("wanted a finite time and a step >= 0")
+        if not isfinite(sum(self.u)):
+            faults = [f"{q.name} = {x!r} {q.unit}" for q, x in self._inputs() if not isfinite(x)]
+            if faults:
+                raise StepError(f"wanted finite inputs, got {', '.join(faults)}")
+
+    def _inputs(self) -> Iterable[tuple[Quantity, float]]:
+        return zip(self.inputs, self.u, strict=True)
+
+    def _outputs(self) -> Iterable[tuple[Quantity, float]]:
+        return zip(self.outputs, self.y, strict=True)
+
     def _refresh(self) -> None:
-        """Outputs for changed inputs; before the end of initialization also for changed parameters and start values."""
+        """Outputs for changed inputs; before the end of initialization also for changed parameters and start values.
+
+        Where they cannot be had (parameters at fault, inputs not finite) the last good ones stay: what is wrong is said
+        at the end of initialization or at the next step, when the host has set all that it wants to set.
+        """
         if self._failed:
             return
-        if not self._running:
-            try:
+        memory, y = self.memory() if self._running else None, self.y[:]
+        try:
+            if not self._running:
                 self.configure()
-            except ParameterError:
-                return  # said at the end of initialization, when the host has set all it wants to set
-            self.begin()
-        self.feed_through()
-        self._stale = False
+                self.begin()
+            self.feed_through()
+            good = isfinite(sum(self.y))
+        except (ParameterError, ArithmeticError, ValueError):
+            good = False
+        if good:
+            self._stale = False
+        else:
+            self.y[:] = y
+            if memory is not None:
+                self.recall(memory)
 
-    # ------------------------------------------------------------------ model description
-    def to_xml(self, model_options: dict[str, str] | None = None) -> Element:
-        """PythonFMU's description, completed: units, limits, exact start values, UTC date, structure."""
-        root = super().to_xml(model_options or {})
-        root.set("generationDateAndTime", RELEASED)
-        root.find("CoSimulation").set("needsExecutionTool", "false")
-        described = {q.name: q for q in (*self.inputs, *self.outputs, *(PARAMETERS[name] for name in self.reals))}
-        for variable in root.iter("ScalarVariable"):
-            real = variable.find("Real")
-            if real is not None:
-                _describe(real, described[variable.get("name", "")])
-        root.insert(list(root).index(root.find("LogCategories")), self._units(described.values()))
-        self._structure(root.find("ModelStructure"))
-        return root
+    # ------------------------------------------------------------------ refusals
+    def _discard(self, why: str) -> bool:
+        self.log(f"{self.instance_name}: {why}", Fmi2Status.error, "logStatusError")
+        return False
+
+    def _refuse(self, why: str) -> None:
+        """Refuse a call that has no status of its own: by an exception, the only way PythonFMU leaves, and only once.
+
+        At an exception PythonFMU gives up its references to the instance, to its class and to its log, and once more
+        when the instance is freed; without the references that are added here the second time frees them under use.
+        """
+        self.log(f"{self.instance_name}: {why}", Fmi2Status.error, "logStatusError")
+        if not self._failed:
+            self._failed = True
+            for held in (self, type(self), self.log_queue):
+                ctypes.pythonapi.Py_IncRef(ctypes.py_object(held))
+            raise RuntimeError(why)
+
+    # ------------------------------------------------------------------ FMI calls: state
+    def _get_fmu_state(self) -> dict[str, Any]:
+        """The whole state as plain data: variables, time, phase and memory."""
+        return {
+            "identity": self.identity,
+            "cells": [self.u[:], self.y[:], self.p[:], self.chosen[:], self.on[:]],
+            "phase": [self.time, self._stale, self._running, self._failed],
+            "memory": self.memory() if self._running else None,
+        }
+
+    def _set_fmu_state(self, state: dict[str, Any]) -> None:
+        """Return to a state of this or another instance of the same code."""
+        try:
+            if self._failed or state["identity"] != self.identity:
+                raise ValueError("another FMU's, or this instance has failed")
+            self.u[:], self.y[:], self.p[:], self.chosen[:], self.on[:] = state["cells"]
+            self.time, self._stale, self._running, self._failed = state["phase"]
+            if self._running:
+                self.recall(state["memory"])
+                self.configure()
+        except (LookupError, TypeError, ValueError) as error:
+            self._refuse(f"setting the state: wanted one that this FMU has given, got {error!r}")
 
     @staticmethod
-    def _units(quantities: Iterable[Quantity]) -> Element:
-        definitions = Element("UnitDefinitions")
-        for unit in dict.fromkeys(q.unit for q in quantities):
-            exponents = {base: str(power) for base, power in UNITS[unit].items()}
-            SubElement(SubElement(definitions, "Unit", name=unit), "BaseUnit", exponents)
-        return definitions
+    def _fmu_state_to_bytes(state: dict[str, Any]) -> bytes:
+        """JSON: doubles as repr, so that they come back bit for bit."""
+        return json.dumps(state, default=asdict).encode()
 
-    def _structure(self, structure: Element) -> None:
-        """Outputs and InitialUnknowns with the dependencies that are true of them."""
-        structure.clear()
-        index = {v.name: str(i) for i, v in enumerate(self.vars.values(), start=1)}
-        known = (*self.outputs[: self.settable], *self.inputs)
-        outputs, initial = SubElement(structure, "Outputs"), SubElement(structure, "InitialUnknowns")
-        for i, q in enumerate(self.outputs):
-            depends = self.dependencies.get(q.name, ())
-            SubElement(outputs, "Unknown", index=index[q.name], dependencies=" ".join(index[n] for n in depends))
-            if i >= self.settable:
-                at_start = [index[k.name] for k in known if k in self.outputs or k.name in depends]
-                SubElement(initial, "Unknown", index=index[q.name], dependencies=" ".join(sorted(at_start, key=int)))
+    @staticmethod
+    def _fmu_state_from_bytes(state: bytes) -> dict[str, Any]:
+        """The state from its bytes (JSON, doubles as repr); of bytes that are none, a state that will be refused."""
+        try:
+            data = json.loads(state)
+        except (ValueError, RecursionError):
+            return {}
+        return data if isinstance(data, dict) else {}
 
-
-def _describe(real: Element, q: Quantity) -> None:
-    real.set("unit", q.unit)
-    low = 0.0 if q.positive else q.low
-    for name, limit in (("min", low), ("max", q.high)):
-        if abs(limit) < float("inf"):
-            real.set(name, repr(limit))
-    if q.nominal != 1.0:
-        real.set("nominal", repr(q.nominal))
-    if "start" in real.attrib:
-        real.set("start", repr(float(q.start)))
+    def to_xml(self, model_options: dict[str, str] | None = None) -> Element:
+        """PythonFMU's description, completed."""
+        return completed(super().to_xml(model_options or {}), self)

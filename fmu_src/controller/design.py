@@ -10,6 +10,7 @@ import json
 from bisect import bisect_right
 from dataclasses import asdict, dataclass
 from pathlib import Path
+from typing import Any
 
 from .halfcar import HalfCar
 from .riccati import finite_horizon, infinite_horizon, riccati_rate
@@ -49,6 +50,15 @@ class Design:
     car: HalfCar
     infinite: Gain | None = None
     finite: GainTable | None = None
+
+    @classmethod
+    def of(cls, data: dict[str, Any]) -> Design:
+        """The design from its plain data (`dataclasses.asdict`, through JSON or not)."""
+        forever, table = data["infinite"], data["finite"]
+        if table is not None:
+            gains, slopes = (tuple(map(tuple, table[key])) for key in ("gains", "slopes"))
+            table = GainTable(tuple(table["to_go"]), gains, slopes)
+        return cls(HalfCar(**data["car"]), None if forever is None else tuple(forever), table)
 
     def serves(self, car: HalfCar, horizon: str, span: float) -> bool:
         """Whether this design holds the gains for this car, horizon and span [s] of time to go."""
@@ -92,10 +102,4 @@ def stored(folder: Path) -> Design | None:
     path = folder / FILE_NAME
     if not path.is_file():
         return None
-    data = json.loads(path.read_text(encoding="utf-8"))
-    table = data["finite"]
-    return Design(
-        HalfCar(**data["car"]),
-        tuple(data["infinite"]),
-        GainTable(tuple(table["to_go"]), tuple(map(tuple, table["gains"])), tuple(map(tuple, table["slopes"]))),
-    )
+    return Design.of(json.loads(path.read_text(encoding="utf-8")))

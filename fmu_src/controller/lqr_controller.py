@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import fields
 from pathlib import Path
-from typing import ClassVar
+from typing import Any, ClassVar
 
 from ..quantities import FORCES, STATES, ParameterError
 from ..slave import Slave
@@ -51,6 +51,13 @@ class LqrController(Slave):
                 f"{span:g} s of control), and computing one needs a package that is not installed: {missing.name}. "
                 "Install 'control' (it brings numpy and scipy) into the Python that runs this FMU, or keep the defaults"
             ) from missing
+
+    def memory(self) -> list[Any]:
+        return [self._design]
+
+    def recall(self, memory: list[Any]) -> None:
+        (design,) = memory
+        self._design = Design.of(design) if isinstance(design, dict) else design
 
     def advance(self, t: float, step: float) -> None:
         self.time = t + step

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import fields
 from math import ceil, isfinite
-from typing import ClassVar
+from typing import Any, ClassVar
 
 from ..integrate import RoadWithin, Vector, cubic_road, rk4, straight_road
 from ..quantities import (
@@ -30,6 +30,8 @@ SAMPLING = Choice(
     values=("start", "end"),
     text="road inputs are values at the start of a step, carried on by their rates, or at its end (road stepped first)",
 )
+
+MOST_PARTS = 200_000  # internal steps of a communication step: more would look like a hang
 
 
 class Vehicle7DOF(Slave):
@@ -59,11 +61,13 @@ class Vehicle7DOF(Slave):
         self._at: tuple[Vector, Vector, Vector] = (self.u[:4], self.u[4:8], self.u[8:12])
 
     def advance(self, t: float, step: float) -> None:
-        road = self._road_within(t, step)
+        road = self._road_within(step)
         u = self.u[:4]
         start = (u, *road(0.0))
         first = self.y[14:21] if start == self._at else None  # nothing has changed: the accelerations are known
-        n = max(1, ceil(step / self._h_max - 1e-9))
+        n = max(1, ceil(min(step / self._h_max - 1e-9, 2.0 * MOST_PARTS)))
+        if n > MOST_PARTS:
+            raise StepError(f"wanted at most {MOST_PARTS} internal steps of h_max = {self._h_max:g} s")
         q, v = self._q, self._v
         try:
             for i in range(n):
@@ -73,33 +77,34 @@ class Vehicle7DOF(Slave):
             if not isfinite(sum(q) + sum(v)):
                 raise OverflowError
         except (ValueError, OverflowError):  # ValueError: sin(inf)
-            raise StepError(self._runaway([*q, *v], t, step)) from None
+            raise StepError(self._runaway([*q, *v])) from None
         self._q, self._v, self._at = q, v, end
         if self._sampled_at_end:  # the rate that the next step sets out with: beyond a corner, if there is one here
             self._at = (u, self.u[4:8], self.u[8:12])
         self._observe()
 
-    def _road_within(self, t: float, step: float) -> RoadWithin:
+    def _road_within(self, step: float) -> RoadWithin:
         """Road over this step as a function of the fraction of it."""
-        if not isfinite(sum(self.u)):
-            faults = [f"{q.name} = {x!r} {q.unit}" for q, x in zip(self.inputs, self.u, strict=True) if not isfinite(x)]
-            raise StepError(f"step from t = {t:g} s: wanted finite inputs, got {', '.join(faults)}")
         h, dh = self.u[4:8], self.u[8:12]
-        if self._sampled_at_end and step > 0.0:
+        if self._sampled_at_end:
             _, h0, dh0 = self._at
             return cubic_road(h0, dh0, h, self.u[12:16], step)
         return straight_road(h, dh, step)
 
-    def _runaway(self, reached: list[float], t: float, step: float) -> str:
-        """Which state left the finite numbers, and when."""
-        before = [*self._q, *self._v]
+    def _runaway(self, reached: list[float]) -> str:
+        """Which state left the finite numbers; where all that is known is that one did, the largest before the step."""
         lost = [(q, x) for q, x in zip(STATES, reached, strict=True) if not isfinite(x)]
-        worst = lost or [max(zip(STATES, before, strict=True), key=lambda pair: abs(pair[1]) / pair[0].nominal)]
+        before = zip(STATES, [*self._q, *self._v], strict=True)
+        worst = lost or [max(before, key=lambda pair: abs(pair[1]) / pair[0].nominal)]
         names = ", ".join(f"{q.name} = {x:g} {q.unit}" for q, x in worst)
-        return (
-            f"step from t = {t:g} s by {step:g} s: the state leaves the finite numbers: {names}; "
-            f"the state at t = {t:g} s is kept. A smaller h_max (now {self._h_max:g} s) or other parameters may help"
-        )
+        return f"the state leaves the finite numbers: {names}. A smaller h_max (now {self._h_max:g} s) may help"
+
+    def memory(self) -> list[Any]:
+        return [self._q, self._v, self._at]
+
+    def recall(self, memory: list[Any]) -> None:
+        q, v, (u, h, dh) = memory
+        self._q, self._v, self._at = tuple(q), tuple(v), (u, h, dh)
 
     def feed_through(self) -> None:
         if self._sampled_at_end:

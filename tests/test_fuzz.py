@@ -1,0 +1,101 @@
+"""2,000 random sequences of FMI calls, legal and illegal order, any values: no crash, no hang, no silent nan."""
+
+from __future__ import annotations
+
+from functools import cache
+from math import isfinite
+from pathlib import Path
+from tempfile import mkdtemp
+
+from conftest import ROOT
+from fmpy import extract
+from host import OK, Host
+from hypothesis import HealthCheck, settings
+from hypothesis import strategies as st
+from hypothesis.stateful import Bundle, RuleBasedStateMachine, initialize, invariant, rule
+
+import build
+
+ANY = st.floats(allow_nan=True, allow_infinity=True) | st.sampled_from([0.0, 1e-3, 0.01, 1.0, 1e300, -1e300, 5e-324])
+STEPS = st.sampled_from([0.0, 1e-9, 1e-3, 1e-3, 1e-3, 0.01, 0.3, 5.0, 1e6, 1e300]) | ANY
+TIMES = st.sampled_from([0.0, 1e-3, 0.25, 100.0, -5.0]) | ANY
+
+
+@cache
+def unpacked(model: str) -> Path:
+    return Path(extract(ROOT / "dist" / f"{model}.fmu", Path(mkdtemp(prefix="fuzz_")) / model))
+
+
+class AnyCalls(RuleBasedStateMachine):
+    """One instance of one of the FMUs, and states that it or an earlier moment of it gave."""
+
+    states: Bundle[bytes] = Bundle("states")
+
+    @initialize(model=st.sampled_from(list(build.MODELS)), start=st.booleans())
+    def instantiate(self, model: str, start: bool) -> None:
+        self.host, self.initialized = Host(unpacked(model)), start
+        if start:
+            assert self.host.start() == OK
+
+    def teardown(self) -> None:
+        self.host.free()
+
+    @rule(time=TIMES)
+    def setup_experiment(self, time: float) -> None:
+        self.host.status("SetupExperiment", 0, 0.0, time, 0, 0.0)
+
+    @rule(call=st.sampled_from(["EnterInitializationMode", "ExitInitializationMode", "Terminate", "Reset"]))
+    def change_phase(self, call: str) -> None:
+        done = self.host.status(call) == OK and not any("initialization:" in message for message in self.host.log)
+        self.initialized = done and (call == "ExitInitializationMode" or (self.initialized and call != "Reset"))
+
+    @rule(t=TIMES, h=STEPS)
+    def step(self, t: float, h: float) -> None:
+        self.host.step(t, h)
+
+    @rule(values=st.lists(ANY, min_size=16, max_size=16))
+    def set_all_inputs(self, values: list[float]) -> None:
+        if self.host.inputs:
+            self.host.set(dict(zip(self.host.inputs, values, strict=False)))
+
+    @rule(references=st.lists(st.integers(0, 90), max_size=5), data=st.data())
+    def set_anything(self, references: list[int], data: st.DataObject) -> None:
+        self.host.set_real(references, [data.draw(ANY) for _ in references])
+
+    @rule(reference=st.integers(0, 90), text=st.sampled_from(["end", "start", "bump", "fourier", "infinite", "", "ψ"]))
+    def set_a_string(self, reference: int, text: str) -> None:
+        self.host.set_string(reference, text)
+
+    @rule(reference=st.integers(0, 90), value=st.booleans())
+    def set_a_boolean(self, reference: int, value: bool) -> None:
+        self.host.set_boolean(reference, value)
+
+    @rule(reference=st.integers(0, 90) | st.just(2**31))
+    def get_anything(self, reference: int) -> None:
+        self.host.real(reference)
+
+    @rule(target=states)
+    def get_state(self) -> bytes:
+        return self.host.to_bytes(self.host.state())
+
+    @rule(state=states)
+    def set_state(self, state: bytes) -> None:
+        self.host.restore(self.host.from_bytes(state))
+        self.initialized = False  # the state may be of an earlier phase
+
+    @invariant()
+    def outputs_are_never_silently_not_finite(self) -> None:
+        values = dict(zip(self.host.outputs, self.host.get(), strict=True))
+        if self.initialized:  # before, start values echo what was set
+            assert all(map(isfinite, values.values())), values
+
+
+AnyCalls.TestCase.settings = settings(
+    max_examples=2000,
+    stateful_step_count=12,
+    deadline=None,
+    derandomize=True,
+    database=None,
+    suppress_health_check=list(HealthCheck),
+)
+TestAnyCalls = AnyCalls.TestCase

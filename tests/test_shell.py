@@ -1,0 +1,260 @@
+"""The FMUs as a host sees them: the whole state, time, refusals, and calls in any order with any values."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+from conftest import ROOT
+from fmpy import extract
+from host import DISCARD, FATAL, OK, Host
+
+import build
+
+MODELS = list(build.MODELS)
+H = 1e-3
+Loader = Callable[[str], Host]
+
+
+@pytest.fixture(scope="session")
+def unpacked(dist: Path, tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
+    folder = tmp_path_factory.mktemp("unpacked")
+    return {model: Path(extract(dist / f"{model}.fmu", folder / model)) for model in MODELS}
+
+
+@pytest.fixture
+def load(unpacked: dict[str, Path]) -> Iterator[Loader]:
+    hosts: list[Host] = []
+
+    def loader(model: str) -> Host:
+        hosts.append(Host(unpacked[model]))
+        return hosts[-1]
+
+    yield loader
+    for host in hosts:
+        host.free()
+
+
+def drive(host: Host, first: int, last: int, h: float = H) -> list[list[float]]:
+    """Steps with inputs that change with time, made of what the host has."""
+    rows = []
+    for k in range(first, last):
+        if host.inputs:
+            assert host.set({name: 1e-3 * np.sin(k + i) for i, name in enumerate(host.inputs)}) == OK
+        assert host.step(k * h, h) == OK, host.log
+        rows.append(host.get())
+    return rows
+
+
+def begun(load: Loader, model: str) -> Host:
+    host = load(model)
+    if model == "LqrController":
+        host.fmu.setReal([host.reference["t_on"]], [0.0])
+        host.fmu.setString([host.reference["activation"]], ["at t_on"])
+    elif model == "Vehicle7DOF":
+        host.fmu.setString([host.reference["road_sampling"]], ["end"])
+    assert host.start() == OK
+    return host
+
+
+@pytest.mark.parametrize("model", MODELS)
+def test_restored_state_and_steps_give_the_same_bits_here_in_another_instance_and_from_bytes(
+    load: Loader, model: str
+) -> None:
+    host = begun(load, model)
+    drive(host, 0, 30)
+    state = host.state()
+    data = host.to_bytes(state)
+    expected = drive(host, 30, 60)
+    assert host.restore(state) == OK
+    assert drive(host, 30, 60) == expected
+    for restored in (load(model), begun(load, model)):  # just instantiated, and under way with other parameters
+        assert restored.restore(restored.from_bytes(data)) == OK
+        assert drive(restored, 30, 60) == expected
+    host.fmu.freeFMUState(state)
+
+
+@pytest.mark.parametrize("model", MODELS)
+def test_a_state_crosses_to_another_process(
+    load: Loader, model: str, unpacked: dict[str, Path], tmp_path: Path
+) -> None:
+    host = begun(load, model)
+    drive(host, 0, 30)
+    (tmp_path / "state").write_bytes(host.to_bytes(host.state()))
+    expected = drive(host, 30, 40)
+    code = (
+        f"import sys; sys.path[:0] = [{str(ROOT)!r}, {str(ROOT / 'tests')!r}]\n"
+        "from pathlib import Path\nfrom test_shell import Host, drive\n"
+        f"host = Host(Path({str(unpacked[model])!r}))\n"
+        f"assert host.restore(host.from_bytes(Path({str(tmp_path / 'state')!r}).read_bytes())) == 0\n"
+        "print(repr(drive(host, 30, 40)))\nhost.free()\n"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=120)
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.strip() == repr(expected)
+
+
+@pytest.mark.parametrize("model", MODELS)
+def test_reset_returns_to_the_fresh_instance(load: Loader, model: str) -> None:
+    host, fresh = begun(load, model), load(model)
+    drive(host, 0, 20)
+    assert host.status("Reset") == OK
+    assert host.start() == fresh.start() == OK
+    assert drive(host, 0, 20) == drive(fresh, 0, 20)
+
+
+@pytest.mark.parametrize("model", MODELS)
+def test_a_step_of_length_zero_changes_nothing(load: Loader, model: str) -> None:
+    with_zero, without = begun(load, model), begun(load, model)
+    drive(with_zero, 0, 20)
+    before = with_zero.get()
+    assert with_zero.step(20 * H, 0.0) == OK
+    assert with_zero.get() == before
+    drive(without, 0, 20)
+    assert drive(with_zero, 20, 30) == drive(without, 20, 30)
+
+
+def test_steps_of_varying_length_tend_to_the_same_motion(load: Loader) -> None:
+    """From a perturbed start on a flat road, where a communication step may have any length."""
+
+    def reached(steps: list[float]) -> np.ndarray:
+        host = load("Vehicle7DOF")
+        assert host.start(**{"body.heave": 0.01, "body.roll": 0.01}) == OK
+        t = 0.0
+        for h in steps:
+            assert host.step(t, h) == OK
+            t += h
+        return np.array(host.get()[:14])
+
+    varied = [1e-3, 7e-3, 1e-5, 0.0, 2.5e-2, 3.33e-4, 1e-1, 1 - 0.133343]
+    regular = reached([1e-3] * 1000)
+    np.testing.assert_allclose(reached(varied), regular, atol=1e-7 * np.abs(regular).max())
+
+
+def test_a_road_that_starts_late_is_the_same_road_later(load: Loader) -> None:
+    late, early = load("RoadExcitation"), load("RoadExcitation")
+    assert late.start(time=100.0, t_start=100.0) == early.start() == OK
+    for k in range(400):
+        assert late.step(100.0 + k * H, H) == early.step(k * H, H) == OK
+        np.testing.assert_allclose(late.get(), early.get(), atol=2e-10)
+
+
+def test_a_long_step_over_all_corners_arrives_at_the_right_road(load: Loader) -> None:
+    jump, walk = load("RoadExcitation"), load("RoadExcitation")
+    assert jump.start() == walk.start() == OK
+    assert jump.step(0.0, 0.26) == OK
+    for k in range(26):
+        assert walk.step(k * 0.01, 0.01) == OK
+    np.testing.assert_allclose(jump.get()[:8], walk.get()[:8], atol=1e-12)
+
+
+# ------------------------------------------------------------------ refusals
+@pytest.mark.parametrize("value", [float("nan"), float("inf"), float("-inf")])
+def test_an_input_that_is_not_finite_is_refused_and_can_be_repaired(load: Loader, value: float) -> None:
+    host, honest = begun(load, "Vehicle7DOF"), begun(load, "Vehicle7DOF")
+    drive(host, 0, 10)
+    drive(honest, 0, 10)
+    before = host.get()
+    assert host.set({"h_rl": value, "force_fr": value}) == OK
+    assert host.get() == before
+    assert host.step(10 * H, H) == DISCARD
+    assert f"force_fr = {value!r} N, h_rl = {value!r} m" in host.log[-1]
+    assert "t = 0.01 s" in host.log[-1]
+    assert drive(host, 10, 20) == drive(honest, 10, 20)
+
+
+@pytest.mark.parametrize("model", MODELS)
+@pytest.mark.parametrize(("t", "h"), [(0.0, -1.0), (float("nan"), H), (0.0, float("inf")), (0.0, float("nan"))])
+def test_impossible_steps_are_refused(load: Loader, model: str, t: float, h: float) -> None:
+    host = begun(load, model)
+    assert host.step(t, h) == DISCARD
+    assert "finite time and a step >= 0" in host.log[-1]
+    drive(host, 0, 5)
+
+
+def test_a_step_that_would_never_end_is_refused(load: Loader) -> None:
+    host = begun(load, "Vehicle7DOF")
+    assert host.step(0.0, 1e9) == DISCARD
+    assert "internal steps of h_max = 0.0005 s" in host.log[-1]
+
+
+@pytest.mark.parametrize(
+    ("model", "values", "said"),
+    [
+        ("Vehicle7DOF", {"m": -1.0, "c2": float("nan")}, "m = -1.0 kg: wanted a finite number > 0; c2 = nan N/m"),
+        ("Vehicle7DOF", {"body.roll": 2.0}, "body.roll = 2.0 rad"),
+        ("Vehicle7DOF", {"a": 0.0, "b": 0.0}, "wheelbase"),
+        ("RoadExcitation", {"v0": 0.0}, "v0 = 0.0 m/s"),
+        ("LqrController", {"T": 0.0}, "T = 0.0 s: wanted an end of control after its start"),
+    ],
+)
+def test_bad_parameters_are_refused_at_the_end_of_initialization(
+    load: Loader, model: str, values: dict[str, float], said: str
+) -> None:
+    host = load(model)
+    assert host.start(**values) == FATAL
+    assert any(said in message for message in host.log), host.log
+    assert host.step(0.0, H) == DISCARD  # quiet and safe ever after
+    assert host.set_real([0], [1.0]) == OK
+    assert all(np.isfinite(host.get()))
+
+
+@pytest.mark.parametrize(
+    ("act", "said"),
+    [
+        (lambda h: h.set({"body.heave_acceleration": 1.0}), "body.heave_acceleration = 1.0: it is an output"),
+        (lambda h: h.set({"m": 900.0}), "m = 900.0: wanted before the end of initialization"),
+        (lambda h: h.set({"body.heave": 0.1}), "body.heave = 0.1: wanted before the end of initialization"),
+        (lambda h: h.set_real([4711], [1.0]), "none of value reference 4711"),
+        (lambda h: h.real(4711)[0], "none of value reference [4711]"),
+        (lambda h: h.set_real([h.reference["road_sampling"]], [1.0]), "setting Real variables: there is none"),
+    ],
+)
+def test_what_may_not_be_set_or_read_is_refused_once_and_the_host_lives(
+    load: Loader, act: Callable[[Host], int], said: str
+) -> None:
+    host = begun(load, "Vehicle7DOF")
+    drive(host, 0, 3)
+    assert act(host) == FATAL
+    assert any(said in message for message in host.log), host.log
+    for _ in range(3):
+        assert act(host) == OK  # PythonFMU itself ends the process at a second exception
+    assert host.step(3 * H, H) == DISCARD
+
+
+def test_a_state_of_another_fmu_and_garbage_are_refused(load: Loader) -> None:
+    road = begun(load, "RoadExcitation")
+    data = road.to_bytes(road.state())
+    own = begun(load, "Vehicle7DOF")
+    cut = own.to_bytes(own.state()).replace(b'"cells": [[', b'"cells": [[], [')
+    for garbage in (data, b"", b"not json", b"[1, 2]", b"{}", b"[" * 100_000, cut):
+        host = begun(load, "Vehicle7DOF")
+        assert host.restore(host.from_bytes(garbage)) == FATAL
+        assert "wanted one that this FMU has given" in " ".join(host.log)
+
+
+def test_200_lives_in_one_process_leave_nothing_behind(dist: Path, tmp_path: Path) -> None:
+    """Instantiate, run, free; memory after the first 50 against memory at the end; no folder of ours left."""
+    code = (
+        "import resource, tempfile\n"
+        f"tempfile.tempdir = {str(tmp_path)!r}\n"
+        "from dataclasses import replace\n"
+        "from pathlib import Path\n"
+        "from analysis.cosimulation import simulate\n"
+        "from analysis.scenario import read_scenario\n"
+        "short = replace(read_scenario('bump'), stop_time=0.01)\n"
+        "def resident():\n"
+        "    return int(Path('/proc/self/statm').read_text().split()[1]) * resource.getpagesize()\n"
+        "for k in range(200):\n"
+        "    simulate(short)\n"
+        "    if k == 50: before = resident()\n"
+        "print(resident() - before)\n"
+    )
+    done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, timeout=600)
+    assert done.returncode == 0, done.stderr
+    assert int(done.stdout) < 150 * 40_000  # bytes: below 40 kB a life, of which PythonFMU keeps some by itself
+    assert list(tmp_path.iterdir()) == []
