@@ -1,0 +1,168 @@
+"""The variables of a slave: declared from the table, read and set by reference, refused where they must be."""
+
+from __future__ import annotations
+
+import ctypes
+from collections.abc import Sequence
+from functools import partial
+from typing import Any, ClassVar
+
+from pythonfmu import (
+    Boolean,
+    DefaultExperiment,
+    Fmi2Causality,
+    Fmi2Initial,
+    Fmi2Slave,
+    Fmi2Variability,
+    Integer,
+    Real,
+    String,
+)
+from pythonfmu.enums import Fmi2Status
+
+from .description import LOG_CATEGORIES
+from .quantities import PARAMETERS, Choice, Quantity
+
+
+class Variables(Fmi2Slave):
+    """Real inputs `u`, real outputs `y` and parameters, all in the order of the class tables."""
+
+    inputs: ClassVar[tuple[Quantity, ...]] = ()
+    outputs: ClassVar[tuple[Quantity, ...]] = ()
+    settable: ClassVar[int] = 0  # the first so many outputs are states, with start values that a host may set
+    reals: ClassVar[tuple[str, ...]] = ()
+    choices: ClassVar[tuple[Choice, ...]] = ()
+    switches: ClassVar[dict[str, str]] = {}  # Boolean parameters, true by default: name -> words
+    dependencies: ClassVar[dict[str, tuple[str, ...]]] = {}  # output -> inputs that it depends on within a step
+    guid: object
+    identity: ClassVar[str] = ""  # hash of the code, set by the slave script of an exported FMU
+
+    log_categories = LOG_CATEGORIES
+    author = "Bertolino–Bakša stability of motor vehicles: the developers"
+    license = "MIT"
+    copyright = "© the developers"
+    default_experiment = DefaultExperiment(start_time=0.0, stop_time=5.0, step_size=1e-3)
+
+    def __init__(self, **kwargs: object) -> None:
+        super().__init__(**kwargs)
+        if self.identity:
+            self.guid = self.identity
+        self.u = [q.start for q in self.inputs]
+        self.y = [q.start for q in self.outputs]
+        self.p = [PARAMETERS[name].start for name in self.reals]
+        self.chosen = [c.start for c in self.choices]
+        self.on = [True for _ in self.switches]
+        self.time = 0.0
+        self._stale = True  # outputs are older than inputs, parameters or start values
+        self._running = False
+        self._failed = False
+        self._reals: dict[int, tuple[list[float], int]] = {}  # where the value of each reference lies
+        self._register()
+
+    def _register(self) -> None:
+        parameter = {"causality": Fmi2Causality.parameter, "variability": Fmi2Variability.fixed}
+        for i, q in enumerate(self.inputs):
+            self._declare(Real, q, self.u, i, causality=Fmi2Causality.input)
+        for i, q in enumerate(self.outputs):
+            initial = Fmi2Initial.exact if i < self.settable else Fmi2Initial.calculated
+            self._declare(Real, q, self.y, i, causality=Fmi2Causality.output, initial=initial)
+        for i, name in enumerate(self.reals):
+            self._declare(Real, PARAMETERS[name], self.p, i, **parameter)
+        for i, choice in enumerate(self.choices):
+            self._declare(String, choice, self.chosen, i, **parameter)
+        for i, (name, text) in enumerate(self.switches.items()):
+            self._declare(Boolean, Choice(name=name, values=("true", "false"), text=text), self.on, i, **parameter)
+        nu, ny = len(self.inputs), len(self.outputs)
+        self._input_refs = list(range(nu))
+        self._output_refs = list(range(nu, nu + ny))
+
+    def _declare(self, kind: type, what: Quantity | Choice, cells: list, index: int, **attributes: object) -> None:
+        getter, setter = partial(cells.__getitem__, index), partial(cells.__setitem__, index)
+        variable = kind(what.name, description=what.description, getter=getter, setter=setter, **attributes)
+        self.register_variable(variable)
+        if kind is Real:
+            self._reals[variable.value_reference] = (cells, index)
+
+    def get_real(self, vrs: list[int]) -> list[float]:
+        """Values by reference; all outputs at once take no loop."""
+        if self._stale:
+            self._refresh()
+        if vrs == self._output_refs:
+            return self.y
+        try:
+            return [cells[i] for cells, i in map(self._reals.__getitem__, vrs)]
+        except KeyError:
+            return [float(value) for value in self._read(vrs, Real)]
+
+    def get_integer(self, vrs: list[int]) -> list[int]:
+        return [int(value) for value in self._read(vrs, Integer)]
+
+    def get_boolean(self, vrs: list[int]) -> list[bool]:
+        return [bool(value) for value in self._read(vrs, Boolean)]
+
+    def get_string(self, vrs: list[int]) -> list[str]:
+        return [str(value) for value in self._read(vrs, String)]
+
+    def set_real(self, vrs: list[int], values: Sequence[float]) -> None:
+        """Set values by reference; all inputs at once take no loop."""
+        if vrs == self._input_refs:
+            self._stale = True
+            self.u[:] = values
+        else:
+            self._write(vrs, values, Real)
+
+    def set_integer(self, vrs: list[int], values: Sequence[int]) -> None:
+        self._write(vrs, values, Integer)
+
+    def set_boolean(self, vrs: list[int], values: Sequence[bool]) -> None:
+        self._write(vrs, values, Boolean)
+
+    def set_string(self, vrs: list[int], values: Sequence[str]) -> None:
+        self._write(vrs, values, String)
+
+    def _read(self, vrs: list[int], kind: type) -> list[Any]:
+        unknown = [vr for vr in vrs if not isinstance(self.vars.get(vr), kind)]
+        if unknown:
+            self._refuse(f"reading {kind.__name__} variables: there are none of value reference {unknown}")
+            return [0] * len(vrs)
+        return [self.vars[vr].getter() for vr in vrs]
+
+    def _write(self, vrs: list[int], values: Sequence[Any], kind: type) -> None:
+        faults = [fault for vr, value in zip(vrs, values, strict=True) if (fault := self._unsettable(vr, value, kind))]
+        if faults:
+            self._refuse("; ".join(faults))
+            return
+        self._stale = True
+        for vr, value in zip(vrs, values, strict=True):
+            self.vars[vr].setter(value)
+
+    def _unsettable(self, vr: int, value: object, kind: type) -> str | None:
+        """Why this variable cannot be set to this value now; None if it can."""
+        variable: Any = self.vars.get(vr)
+        known = isinstance(variable, kind)
+        if not known:
+            return f"setting {kind.__name__} variables: there is none of value reference {vr}"
+        if variable.causality == Fmi2Causality.input:
+            return None
+        if variable.causality == Fmi2Causality.output and variable.initial != Fmi2Initial.exact:
+            return f"setting {variable.name} = {value!r}: it is an output"
+        if self._running:
+            return f"setting {variable.name} = {value!r}: wanted before the end of initialization"
+        return None
+
+    def _refresh(self) -> None:
+        """Renew the outputs after something was set."""
+        raise NotImplementedError
+
+    def _refuse(self, why: str) -> None:
+        """Refuse a call that has no status of its own: by an exception, the only way PythonFMU leaves, and only once.
+
+        At an exception PythonFMU gives up its references to the instance, to its class and to its log, and once more
+        when the instance is freed; without the references that are added here the second time frees them under use.
+        """
+        self.log(f"{self.instance_name}: {why}", Fmi2Status.error, "logStatusError")
+        if not self._failed:
+            self._failed = True
+            for held in (self, type(self), self.log_queue):
+                ctypes.pythonapi.Py_IncRef(ctypes.py_object(held))
+            raise RuntimeError(why)
