@@ -26,6 +26,7 @@ STAMP = ENVIRONMENT / "installed.json"
 DIST = ROOT / "dist"
 PACKAGE = ROOT / "fmu_src"
 SYSTEM = PACKAGE / "system"
+LEFT_OUT = ("__pycache__", "export", "system")  # of the package, in an FMU: not needed while it steps
 
 # FMU (also the name of its class) -> the module that holds the class
 MODELS = {
@@ -95,17 +96,21 @@ def _install(extras: list[str]) -> None:
 
 # ---------------------------------------------------------------------------------------------------- FMUs
 def build(quiet: bool = False) -> None:
-    """Build dist/*.fmu and dist/VehicleOnRoad.ssp, unless they are younger than their sources."""
-    fresh = _content_hash([PACKAGE, ROOT / "build.py", ROOT / "constraints.txt"])
+    """Build dist/*.fmu, their sets for the FMI Cross-Check and VehicleOnRoad.ssp, unless younger than their sources."""
+    fresh = _content_hash([PACKAGE, *(ROOT / name for name in ("build.py", "constraints.txt", "LICENSE"))])
     stamp = DIST / "sources.sha256"
     if stamp.is_file() and stamp.read_text() == fresh:
         return
     if not quiet:
         print(f"Building the FMUs in {DIST} ...", file=sys.stderr, flush=True)
+    from fmu_src.export.cross_check import write_cross_check
+
     DIST.mkdir(exist_ok=True)
     stamp.unlink(missing_ok=True)
+    shutil.rmtree(DIST / "cross-check", ignore_errors=True)
     for model in MODELS:
         build_fmu(model, PACKAGE, DIST / f"{model}.fmu")
+        write_cross_check(DIST / f"{model}.fmu", DIST / "cross-check")
     ssp = {"SystemStructure.ssd": SYSTEM / "SystemStructure.ssd"}
     ssp |= {f"resources/{model}.fmu": DIST / f"{model}.fmu" for model in MODELS}
     write_archive(DIST / "VehicleOnRoad.ssp", {name: path.read_bytes() for name, path in ssp.items()})
@@ -116,15 +121,18 @@ def build_fmu(model: str, package: Path, target: Path) -> None:
     """Export one model of the package with pythonfmu; the same sources give the same bytes.
 
     The package goes into the resources under a name that carries the hash of its content, with a slave script whose
-    name carries it too: a host process can then hold two versions.
+    name carries it too: a host process can then hold two versions. Documentation and reference results (of a run of
+    the FMU just made) are added at the end and have no part in the hash.
     """
     from pythonfmu import FmuBuilder
 
-    identity = hashlib.sha256(f"{model} {_content_hash([package])}".encode()).hexdigest()[:32]
+    from fmu_src.export.contents import extra_entries
+
+    identity = hashlib.sha256(f"{model} {_content_hash([package], LEFT_OUT)}".encode()).hexdigest()[:32]
     name = f"fmu_src_{identity[:12]}"
     with tempfile.TemporaryDirectory(prefix="build_fmu_") as temporary:
         folder = Path(temporary)
-        shutil.copytree(package, folder / name, ignore=shutil.ignore_patterns("__pycache__", "system"))
+        shutil.copytree(package, folder / name, ignore=shutil.ignore_patterns(*LEFT_OUT))
         script = folder / f"{model.lower()}_{identity[:12]}.py"
         script.write_text(ENTRY.format(model=model, module=MODELS[model], package=name, identity=identity))
         files = [folder / name]
@@ -136,6 +144,7 @@ def build_fmu(model: str, package: Path, target: Path) -> None:
             sys.path.remove(str(folder))  # left there by the builder
         with zipfile.ZipFile(made) as archive:
             contents = {entry: archive.read(entry) for entry in archive.namelist()}
+        contents |= extra_entries(made)
     write_archive(target, contents)
 
 
@@ -159,12 +168,13 @@ def write_archive(target: Path, contents: dict[str, bytes]) -> None:
         part.replace(target)
 
 
-def _content_hash(paths: list[Path]) -> str:
+def _content_hash(paths: list[Path], left_out: tuple[str, ...] = ("__pycache__",)) -> str:
     digest = hashlib.sha256()
     for path in paths:
         for file in sorted(path.rglob("*")) if path.is_dir() else [path]:
-            if file.is_file() and "__pycache__" not in file.parts:
-                digest.update(file.relative_to(path.parent).as_posix().encode() + b"\0" + file.read_bytes() + b"\0")
+            name = file.relative_to(path.parent)
+            if file.is_file() and not set(left_out) & set(name.parts):
+                digest.update(name.as_posix().encode() + b"\0" + file.read_bytes() + b"\0")
     return digest.hexdigest()
 
 
