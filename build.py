@@ -62,7 +62,12 @@ def environment_python() -> Path:
 def enter_environment(extras: list[str]) -> None:
     """Set up `.venv` if it is missing or stale, then continue this very command inside it."""
     settings = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
-    wanted = [settings["project"], settings["build-system"], (ROOT / "constraints.txt").read_text(encoding="utf-8")]
+    wanted = [
+        str(ROOT),
+        settings["project"],
+        settings["build-system"],
+        (ROOT / "constraints.txt").read_text(encoding="utf-8"),
+    ]
     key = hashlib.sha256(json.dumps(wanted).encode()).hexdigest()
     installed = json.loads(STAMP.read_text()) if STAMP.is_file() else {}
     if installed.get("key") != key or not set(extras) <= set(installed["extras"]):
@@ -71,10 +76,15 @@ def enter_environment(extras: list[str]) -> None:
         _install(sorted({*extras, *installed.get("extras", [])}))
         STAMP.write_text(json.dumps({"key": key, "extras": sorted({*extras, *installed.get("extras", [])})}))
     if Path(sys.prefix) != ENVIRONMENT:
-        command = [str(environment_python()), str(Path(__file__).resolve()), *sys.argv[1:]]
-        if os.name == "nt":
-            sys.exit(subprocess.call(command))
+        sys.exit(_become([str(environment_python()), str(Path(__file__).resolve()), *sys.argv[1:]]))
+
+
+def _become(command: list[str]) -> int:
+    """Go on as this command, so that signals reach it; where a process cannot, run it and return its status."""
+    if os.name != "nt":
+        sys.stdout.flush()
         os.execv(command[0], command)
+    return subprocess.call(command)
 
 
 def _install(extras: list[str]) -> None:
@@ -99,7 +109,8 @@ def build(quiet: bool = False) -> None:
     """Build dist/*.fmu, their sets for the FMI Cross-Check and VehicleOnRoad.ssp, unless younger than their sources."""
     fresh = _content_hash([PACKAGE, *(ROOT / name for name in ("build.py", "constraints.txt", "LICENSE"))])
     stamp = DIST / "sources.sha256"
-    if stamp.is_file() and stamp.read_text() == fresh:
+    made = [DIST / "VehicleOnRoad.ssp", *(DIST / f"{model}.fmu" for model in MODELS)]
+    if stamp.is_file() and stamp.read_text() == fresh and all(path.is_file() for path in made):
         return
     if not quiet:
         print(f"Building the FMUs in {DIST} ...", file=sys.stderr, flush=True)
@@ -152,7 +163,7 @@ def store_default_design(folder: Path) -> Path:
     """Design the controller for the default parameters, so that the FMU as shipped needs no numeric library."""
     from fmu_src.controller import design, halfcar
 
-    design.store(design.design(halfcar.HalfCar(), infinite=True, span=design.DEFAULT_SPAN), folder)
+    design.store(design.design(halfcar.HalfCar(), infinite=True, span=float("inf")), folder)
     return folder / design.FILE_NAME
 
 
@@ -183,7 +194,7 @@ def run(scenario: str, out: Path | None) -> int:
     """Co-simulate a scenario, check it, and write the report."""
     build()
     where = ["-o", str(out)] if out else []
-    return subprocess.call([sys.executable, "-m", "analysis", "run", scenario, *where])
+    return _become([sys.executable, "-m", "analysis", "run", scenario, *where])
 
 
 def test(arguments: list[str]) -> int:
@@ -206,7 +217,7 @@ def test(arguments: list[str]) -> int:
 def bench() -> int:
     """Time the default closed loop beside the alternatives."""
     build()
-    return subprocess.call([sys.executable, str(ROOT / "benchmarks" / "closed_loop.py")])
+    return _become([sys.executable, str(ROOT / "benchmarks" / "closed_loop.py")])
 
 
 def clean() -> int:

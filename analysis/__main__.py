@@ -14,7 +14,7 @@ from fmu_src.quantities import ParameterError
 from .errors import CosimError, InputError
 from .files import write_whole
 from .scenario import Scenario, built_in_scenarios, read_scenario
-from .trajectory import COUNTERPART, FINDINGS, Run, new_run_folder, read_run, write_run
+from .trajectory import COUNTERPART, FINDINGS, Run, new_run_folder, read_record, read_run, write_run
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -61,12 +61,15 @@ def _simulate(options: argparse.Namespace) -> int:
 
     scenario = read_scenario(options.scenario)
     with new_run_folder(options.out) as folder:
-        write_run(simulate(scenario, progress=True), folder)
+        run = simulate(scenario, progress=True)
+        _compare_fmus(options.scenario, run)
+        write_run(run, folder)
     print(f"{options.out}: written")
     return 0
 
 
 def _run(options: argparse.Namespace) -> int:
+    from .check import lacking
     from .cosimulation import simulate
     from .report import write_report
 
@@ -74,13 +77,26 @@ def _run(options: argparse.Namespace) -> int:
     target = options.out or Path("runs") / scenario.name
     with new_run_folder(target) as folder:
         run = simulate(scenario, progress=True)
+        _compare_fmus(options.scenario, run)
         write_run(run, folder)
         _simulate_counterpart(scenario, run, folder / COUNTERPART)
-        verdict = _judge(run, folder)
+        verdict = 0
+        if missing := lacking(run):
+            print(f"nothing is checked: {', '.join(missing)} are not among `record`", file=sys.stderr)
+        else:
+            verdict = _judge(run, folder)
         print("Drawing the figures ...", file=sys.stderr, flush=True)
         write_report(folder)
     print(f"{target / 'report.html'}: written")
     return verdict
+
+
+def _compare_fmus(scenario: str, run: Run) -> None:
+    """Say so if a run that is repeated from its record was made by other FMUs."""
+    if scenario.endswith(".json"):
+        before, now = read_record(Path(scenario))["fmus"], run.record["fmus"]
+        if others := [name for name in now if before.get(name, {}).get("sha256") != now[name]["sha256"]]:
+            print(f"not the FMUs of {scenario}: {', '.join(others)}; results may differ", file=sys.stderr)
 
 
 def _simulate_counterpart(scenario: Scenario, run: Run, folder: Path) -> None:

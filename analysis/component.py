@@ -12,7 +12,7 @@ from fmpy import extract, read_model_description
 from fmpy.fmi2 import FMU2Slave, defaultCallbacks, fmi2CallbackFunctions, fmi2CallbackLoggerTYPE
 from fmpy.logging import addLoggerProxy
 
-from .errors import CosimError
+from .errors import CosimError, InputError
 
 WARNING = 1  # highest fmi2Status that lets a simulation go on
 STATUS = ("ok", "warning", "discard", "error", "fatal", "pending")
@@ -24,24 +24,25 @@ Access = ctypes.PYFUNCTYPE(ctypes.c_int, ctypes.c_void_p, ctypes.c_void_p, ctype
 Step = ctypes.PYFUNCTYPE(ctypes.c_int, ctypes.c_void_p, ctypes.c_double, ctypes.c_double, ctypes.c_int)
 
 
-_logs: dict[int, list[str]] = {}  # messages of each living component, by the environment its callbacks carry
+logs: dict[int, list[str]] = {}  # messages of each living component, by the environment its callbacks carry
 
 
 @fmi2CallbackLoggerTYPE
 def _logger(environment: int, _name: bytes, status: int, _category: bytes, message: bytes) -> None:
     """The one logger of this process: fmpy's proxy, which fills in the arguments of a message, keeps only one."""
-    if status > WARNING and environment in _logs:
-        _logs[environment].append(" ".join(message.decode("utf-8", "replace").split()))
+    if status > WARNING and environment in logs:
+        logs[environment].append(" ".join(message.decode("utf-8", "replace").split()))
 
 
-def _callbacks(environment: int) -> Any:
-    callbacks = fmi2CallbackFunctions()
-    callbacks.logger = _logger
-    callbacks.allocateMemory = defaultCallbacks.allocateMemory
-    callbacks.freeMemory = defaultCallbacks.freeMemory
-    callbacks.componentEnvironment = environment
-    addLoggerProxy(ctypes.byref(callbacks))
-    return callbacks
+def callbacks(environment: int) -> Any:
+    """Callbacks of an instance whose messages go to `logs[environment]`."""
+    made = fmi2CallbackFunctions()
+    made.logger = _logger
+    made.allocateMemory = defaultCallbacks.allocateMemory
+    made.freeMemory = defaultCallbacks.freeMemory
+    made.componentEnvironment = environment
+    addLoggerProxy(ctypes.byref(made))
+    return made
 
 
 class Component:
@@ -49,25 +50,27 @@ class Component:
 
     def __init__(self, name: str, archive: Path, folder: Path) -> None:
         self.name, self.log = name, list[str]()
-        _logs[id(self.log)] = self.log
-        self.sha256 = hashlib.sha256(archive.read_bytes()).hexdigest()
         try:
+            self.sha256 = hashlib.sha256(archive.read_bytes()).hexdigest()
             extract(archive, folder)
             description = read_model_description(folder, validate=False)
-            if description.coSimulation is None:
-                raise CosimError(f"{name}: {archive.name} has no co-simulation interface")
-            self.guid = description.guid
-            self.variables = {v.name: v for v in description.modelVariables}
+        except Exception as error:  # fmpy raises bare Exceptions; zipfile and the system their own
+            raise InputError(f"{name}: {archive.name} cannot be unpacked: {error}") from error
+        if description.coSimulation is None:
+            raise InputError(f"{name}: {archive.name} has no co-simulation interface")
+        self.guid = description.guid
+        self.variables = {v.name: v for v in description.modelVariables}
+        logs[id(self.log)] = self.log
+        try:
             self.fmu = FMU2Slave(
                 guid=description.guid,
                 modelIdentifier=description.coSimulation.modelIdentifier,
                 unzipDirectory=str(folder),
                 instanceName=name,
             )
-            self.fmu.instantiate(callbacks=_callbacks(id(self.log)), loggingOn=True)
-        except CosimError:
-            raise
-        except Exception as error:  # fmpy raises bare Exceptions
+            self.fmu.instantiate(callbacks=callbacks(id(self.log)), loggingOn=True)
+        except Exception as error:
+            del logs[id(self.log)]
             raise CosimError(f"{name}: {archive.name} cannot be loaded: {error}{self._said()}") from error
         self.get_real = Access(_address(self.fmu, "fmi2GetReal"))
         self.set_real = Access(_address(self.fmu, "fmi2SetReal"))
@@ -79,7 +82,7 @@ class Component:
         """Names of the real variables of this causality, in the FMU's order."""
         return [v.name for v in self.variables.values() if v.causality == causality and v.type == "Real"]
 
-    def has_real(self, name: str) -> bool:
+    def has(self, name: str) -> bool:
         """Whether the FMU has a real variable of this name."""
         return name in self.variables and self.variables[name].type == "Real"
 
@@ -101,16 +104,16 @@ class Component:
         found: dict[str, Value] = {}
         for v in self.variables.values():
             if v.causality == "parameter":
-                (value,) = getters[v.type]([v.valueReference])
+                (value,) = self.call(getters[v.type], [v.valueReference])
                 found[v.name] = (
                     value.decode() if isinstance(value, bytes) else bool(value) if v.type == "Boolean" else value
                 )
         return found
 
-    def call(self, function: Callable[..., Any], *arguments: Any, **keywords: Any) -> None:
+    def call(self, function: Callable[..., Any], *arguments: Any, **keywords: Any) -> Any:
         """Call a method of fmpy's; a status above warning becomes a CosimError that quotes the FMU's log."""
         try:
-            function(*arguments, **keywords)
+            return function(*arguments, **keywords)
         except Exception as error:  # fmpy raises FMICallException, and bare Exceptions
             self._usable = False
             raise CosimError(f"{self.name}: {str(error).rstrip('.')}{self._said()}") from error
@@ -130,7 +133,7 @@ class Component:
         if self._usable:
             self.fmu.terminate()
         self.fmu.freeInstance()
-        del _logs[id(self.log)]
+        del logs[id(self.log)]
 
 
 def _address(fmu: Any, function: str) -> int:

@@ -8,6 +8,7 @@ pointer, and the table is the recording.
 from __future__ import annotations
 
 import contextlib
+import math
 import platform
 import signal
 import tempfile
@@ -44,10 +45,11 @@ def simulate(scenario: Scenario, system: Path = DEFAULT_SYSTEM, *, progress: boo
         raise InputError(f"{system}: no such file; build it with: python3 build.py build")
     with contextlib.ExitStack() as stack:
         folder = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="cosimulation_")))
+        caught = stack.enter_context(_deferred_signals())
         wiring, components = _load(system, folder, stack)
         _initialize(components, scenario)
         parameters = {name: c.parameters() for name, c in components.items()}
-        trajectory = _Table(components, wiring, scenario).fill(progress)
+        trajectory = _Table(components, wiring, scenario).fill(caught, progress)
     record = {
         "format": 1,
         "scenario": scenario.as_json(),
@@ -77,6 +79,10 @@ def _load(system: Path, folder: Path, stack: contextlib.ExitStack) -> tuple[Wiri
         component = Component(name, folder / source, folder / "unpacked" / name)
         stack.callback(component.free)
         components[name] = component
+    ports = {*wiring.feeds, *wiring.feeds.values()}
+    lacking = [f"{p.component}.{p.variable}" for p in ports if not components[p.component].has(p.variable)]
+    if lacking:
+        raise InputError(f"{system}: its FMUs lack these of its connectors: {', '.join(sorted(lacking))}")
     return wiring, components
 
 
@@ -113,10 +119,13 @@ class _Table:
         feeds = {name: [wiring.feeds[Port(name, v)] for v in inputs] for name, inputs in self.inputs.items()}
         self.layout = lay_out(self.outputs, feeds, list(components), scenario.coupling)
         span = scenario.stop_time - scenario.start_time
-        self.whole = int(span / scenario.step * (1 + 1e-12))  # steps of full length
+        self.whole = round(span / scenario.step)  # steps of full length
         self.rest = span - self.whole * scenario.step
-        if self.rest <= 1e-9 * scenario.step:
+        if abs(self.rest) <= 1e-9 * scenario.step + 4.0 * math.ulp(abs(scenario.start_time) + abs(scenario.stop_time)):
             self.rest = 0.0
+        elif self.rest < 0.0:
+            self.whole -= 1
+            self.rest += scenario.step
         self.rows = np.zeros((1 + self.whole + (self.rest > 0.0), self.layout.width))
 
     def _recorded(self, wanted: Sequence[str]) -> list[Port]:
@@ -126,7 +135,7 @@ class _Table:
         found = []
         for variable in wanted:
             owners = [name for name, variables in self.outputs.items() if variable in variables]
-            owners += [name for name, c in self.components.items() if c.has_real(variable)]
+            owners += [name for name, c in self.components.items() if c.has(variable)]
             if not owners:
                 known = ", ".join(v for variables in self.outputs.values() for v in variables)
                 raise InputError(f"record: no component has a real variable {variable!r}; outputs are: {known}")
@@ -135,26 +144,25 @@ class _Table:
             found.append(Port(owners[0], variable))
         return found
 
-    def fill(self, progress: bool) -> Trajectory:
-        """Run from start to stop."""
+    def fill(self, caught: list[int], progress: bool) -> Trajectory:
+        """Run from start to stop, or until a signal has been caught."""
         s = self.scenario
         self._first_row()
         stages = [self._stage(name) for name in self.components]
         bar = tqdm(
             total=len(self.rows) - 1, unit=" steps", desc=s.name, disable=None if progress else True, leave=False
         )
-        with _deferred_signals() as caught, bar:
+        with bar:
             for first in range(0, self.whole, CHUNK):
                 last = min(first + CHUNK, self.whole)
                 _advance(stages, range(first, last), s.start_time, s.step, s.step, self.rows)
                 bar.update(last - first)
                 if caught:
-                    break
-            if self.rest and not caught:
+                    raise KeyboardInterrupt
+            if self.rest:
                 _advance(stages, range(self.whole, self.whole + 1), s.start_time, s.step, self.rest, self.rows)
         time = s.start_time + s.step * np.arange(len(self.rows), dtype=np.float64)
-        if self.rest:
-            time[-1] = s.stop_time
+        time[-1] = s.stop_time
         columns = [self.layout.columns[port] for port in self.recorded]
         names = tuple(port.variable for port in self.recorded)
         return Trajectory(time=time, names=names, values=self.rows[:, columns])
@@ -173,7 +181,7 @@ class _Table:
 
     def _read_first(self, name: str, c: Component) -> None:
         columns = [self.layout.columns[Port(name, v)] for v in self.outputs[name]]
-        self.rows[0, columns] = c.fmu.getReal(list(c.references(self.outputs[name])))
+        self.rows[0, columns] = c.call(c.fmu.getReal, list(c.references(self.outputs[name])))
 
     def _stage(self, name: str) -> _Stage:
         c, layout = self.components[name], self.layout
@@ -224,12 +232,12 @@ def _deferred_signals() -> Iterator[list[int]]:
     if threading.current_thread() is not threading.main_thread():
         yield caught
         return
-    signals = (signal.SIGINT, signal.SIGTERM)
-    previous = [signal.signal(number, lambda got, _: caught.append(got)) for number in signals]
+    heard = [n for n in (signal.SIGINT, signal.SIGTERM) if signal.getsignal(n) not in (signal.SIG_IGN, None)]
+    previous = [signal.signal(number, lambda got, _: caught.append(got)) for number in heard]
     try:
         yield caught
     finally:
-        for number, handler in zip(signals, previous, strict=True):
+        for number, handler in zip(heard, previous, strict=True):
             signal.signal(number, handler)
         if caught:
             signal.raise_signal(caught[0])

@@ -78,13 +78,18 @@ def closed_loop(scenario: Scenario, times: Array, *, rtol: float = 1e-12) -> Arr
 
 
 def outputs(scenario: Scenario, times: Array, states: Array) -> Array:
-    """All outputs of car, road and controller in each row, from its time and states: what a co-simulation records."""
+    """All outputs of car, road and controller in each row, from its time and states.
+
+    As a co-simulation records them: accelerations at the end of a step are those under the forces held over it.
+    """
     ground, motion = road_of(scenario.parameters), equations_of_motion(car_of(scenario.parameters))
     law = _law(control_of(scenario.parameters))
-    rows = []
+    rows: list[tuple[float, ...]] = []
+    held: Sequence[float] | None = None
     for t, x in zip(times.tolist(), states.tolist(), strict=True):
         u, h, dh = law(t, x), ground.heights(t), ground.rates(t)
-        accelerations, travels, tyres = motion(x[:7], x[7:], u, h, dh)
+        accelerations, travels, tyres = motion(x[:7], x[7:], held or u, h, dh)
+        held = u
         rows.append((*h, *dh, *x, *accelerations, *travels, *tyres, *u))
     return np.array(rows)
 

@@ -5,8 +5,12 @@ from __future__ import annotations
 import contextlib
 import csv
 import json
+import math
 import shutil
+import sys
 import tempfile
+from array import array
+from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,6 +18,8 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+
+from fmu_src.quantities import PARAMETERS
 
 from .errors import InputError
 
@@ -63,36 +69,39 @@ class Run:
 
 def write_csv(trajectory: Trajectory, path: Path) -> None:
     """Write time and variables; every double is written so that reading gives the same bits."""
-    header = ",".join(("time", *trajectory.names))
-    table = np.column_stack([trajectory.time, trajectory.values]).tolist()
     with path.open("w", encoding="utf-8", newline="") as file:
-        file.write(header + "\n")
-        file.writelines(",".join(map(repr, row)) + "\n" for row in table)
+        csv.writer(file, lineterminator="\n").writerow(("time", *trajectory.names))
+        for t, row in zip(trajectory.time.tolist(), trajectory.values, strict=True):
+            file.write(",".join(map(repr, [t, *row.tolist()])) + "\n")
 
 
 def read_csv(path: Path) -> Trajectory:
     """Read a trajectory. Raises InputError naming row and column of what cannot be a trajectory."""
     try:
         with path.open(encoding="utf-8", newline="") as file:
-            rows = list(csv.reader(file))
-    except (OSError, UnicodeDecodeError) as error:
+            return _parsed(csv.reader(file), path)
+    except (OSError, UnicodeDecodeError, csv.Error) as error:
         raise InputError(f"{path}: cannot be read: {error}") from error
-    if not rows or rows[0][:1] != ["time"]:
-        raise InputError(
-            f"{path}: row 1: wanted a header that begins with 'time', got {rows[0][:3] if rows else 'nothing'}"
-        )
-    names = tuple(rows[0][1:])
-    if len(set(names)) < len(names):
-        twice = next(name for name in names if names.count(name) > 1)
+
+
+def _parsed(rows: Iterator[list[str]], path: Path) -> Trajectory:
+    header = next(rows, [])
+    if header[:1] != ["time"]:
+        raise InputError(f"{path}: row 1: wanted a header that begins with 'time', got {header[:3] or 'nothing'}")
+    if twice := next((name for name, times in Counter(header).items() if times > 1), None):
         raise InputError(f"{path}: row 1: column {twice!r} stands there twice")
-    if len(rows) < 2:
+    cells = array("d")
+    for number, row in enumerate(rows, start=2):
+        cells.extend(_numbers(row, number, header, path))
+    table = np.array(cells).reshape(-1, len(header))
+    if not len(table):
         raise InputError(f"{path}: wanted at least one row of numbers below the header, got none")
-    table = np.array([_numbers(row, number, rows[0], path) for number, row in enumerate(rows[1:], start=2)])
-    late = np.flatnonzero(np.diff(table[:, 0]) <= 0)
+    time = table[:, 0]
+    late = np.flatnonzero(time[1:] <= time[:-1])
     if late.size:
-        row, t = int(late[0]) + 3, table[late[0] + 1, 0]
-        raise InputError(f"{path}: row {row}, column 'time': wanted more than {table[late[0], 0]!r} s, got {t!r} s")
-    return Trajectory(time=table[:, 0].copy(), names=names, values=table[:, 1:].copy())
+        before, t = time[late[0] : late[0] + 2].tolist()
+        raise InputError(f"{path}: row {late[0] + 3}, column 'time': wanted more than {before!r} s, got {t!r} s")
+    return Trajectory(time=time.copy(), names=tuple(header[1:]), values=table[:, 1:].copy())
 
 
 def _numbers(row: list[str], number: int, header: list[str], path: Path) -> list[float]:
@@ -104,7 +113,7 @@ def _numbers(row: list[str], number: int, header: list[str], path: Path) -> list
             value = float(text)
         except ValueError:
             value = float("nan")
-        if not np.isfinite(value):
+        if not math.isfinite(value):
             raise InputError(f"{path}: row {number}, column {name!r}: wanted a finite number, got {text!r}")
         numbers.append(value)
     return numbers
@@ -120,12 +129,34 @@ def read_record(path: Path) -> dict[str, Any]:
     """Read a run.json. Raises InputError where it is not one."""
     try:
         record = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError) as error:
+    except (OSError, ValueError, RecursionError) as error:
         raise InputError(f"{path}: cannot be read as the record of a run: {error}") from error
     missing = {"scenario", "parameters", "fmus"} - set(record if isinstance(record, dict) else ())
     if missing:
         raise InputError(f"{path}: wanted the record of a run, but {', '.join(sorted(missing))} is missing")
+    tables = {key: record[key] for key in ("scenario", "parameters", "fmus")}
+    for section in ("parameters", "fmus"):
+        if isinstance(record[section], dict):
+            tables |= {f"{section}: {name}": table for name, table in record[section].items()}
+    if fault := next(
+        (f"{key}: wanted an object, got {t!r:.60}" for key, t in tables.items() if type(t) is not dict), ""
+    ):
+        raise InputError(f"{path}: {fault}")
+    _check_parameters(record["parameters"], path)
     return record
+
+
+def _check_parameters(parameters: dict[str, dict[str, Any]], path: Path) -> None:
+    """Numbers where numbers belong, and one value for one name: what `Run.parameters` takes for granted."""
+    found: dict[str, Any] = {}
+    for component, values in parameters.items():
+        for name, value in values.items():
+            where = f"{path}: parameters: {component}: {name} = {value!r:.60}"
+            number = isinstance(value, int | float) and not isinstance(value, bool)
+            if name in PARAMETERS and not (number and abs(value) <= sys.float_info.max):
+                raise InputError(f"{where}: wanted a finite number")
+            if found.setdefault(name, value) != value:
+                raise InputError(f"{where}: wanted {found[name]!r:.60}, as in another component")
 
 
 def read_run(folder: Path) -> Run:
@@ -141,15 +172,42 @@ def new_run_folder(target: Path) -> Iterator[Path]:
 
     An older run at `target` is replaced; a folder that is not a run is refused with InputError.
     """
-    if target.exists() and not (target.is_dir() and ((target / RECORD).is_file() or not any(target.iterdir()))):
-        raise InputError(f"{target}: is there already and is not a run folder (no {RECORD} in it); it is left alone")
-    target.parent.mkdir(parents=True, exist_ok=True)
-    part = Path(tempfile.mkdtemp(prefix=f".{target.name}-", dir=target.parent))
-    try:
-        yield part
-        part.chmod(0o755)
-        if target.exists():
-            shutil.rmtree(target)
-        part.rename(target)
-    finally:
-        shutil.rmtree(part, ignore_errors=True)
+    with contextlib.ExitStack() as stack:
+        try:
+            place = target.resolve()
+            if place.exists() and not _may_be_replaced(place):
+                raise InputError(f"{target}: is there already and is not a run folder; it is left alone")
+            for folder in reversed(place.parents):  # the innermost is removed first
+                if not folder.exists():
+                    stack.callback(_remove_if_empty, folder)
+            place.parent.mkdir(parents=True, exist_ok=True)
+            part = Path(tempfile.mkdtemp(prefix=f".{place.name[:40]}-", dir=place.parent))
+            stack.callback(shutil.rmtree, part, ignore_errors=True)
+            new, older = part / "new" / place.name, part / "older"
+            new.mkdir(parents=True)
+        except (OSError, RuntimeError) as error:  # RuntimeError: a loop of links
+            raise InputError(f"{target}: no run can be written there: {error}") from error
+        yield new
+        try:
+            if place.exists():
+                place.rename(older)
+            new.rename(place)
+        except OSError as error:
+            raise InputError(f"{target}: the run cannot be put there: {error}") from error
+        finally:
+            if older.exists() and not place.exists():
+                older.rename(place)
+
+
+def _may_be_replaced(folder: Path) -> bool:
+    """Whether the folder is empty or holds a run."""
+    if not folder.is_dir():
+        return False
+    with contextlib.suppress(InputError):
+        return bool(read_record(folder / RECORD))
+    return not any(folder.iterdir())
+
+
+def _remove_if_empty(folder: Path) -> None:
+    with contextlib.suppress(OSError):
+        folder.rmdir()

@@ -38,7 +38,8 @@ class Quantity:
         if self.positive and not 0.0 < value < inf:
             return f"{self.name} = {value!r} {self.unit}: wanted a finite number > 0"
         if not (self.low <= value <= self.high and abs(value) < inf):
-            return f"{self.name} = {value!r} {self.unit}: wanted a finite number in [{self.low:g}, {self.high:g}]"
+            limits = "" if self.low == -self.high == -inf else f" in [{self.low:g}, {self.high:g}]"
+            return f"{self.name} = {value!r} {self.unit}: wanted a finite number{limits}"
         return None
 
 
@@ -236,9 +237,13 @@ TABLE: dict[str, Quantity] = {
 class ParameterError(ValueError):
     """Parameters that no component can work with; the message lists every fault."""
 
+    def __init__(self, faults: list[str]) -> None:
+        super().__init__("; ".join(faults))
+        self.faults = faults
+
 
 def refuse(faults: Iterable[str | None]) -> None:
     """Raise ParameterError with all faults, if there are any."""
     found = [fault for fault in faults if fault]
     if found:
-        raise ParameterError("; ".join(found))
+        raise ParameterError(found)

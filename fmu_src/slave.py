@@ -12,7 +12,7 @@ from xml.etree.ElementTree import Element
 from pythonfmu.enums import Fmi2Status
 
 from .description import completed
-from .quantities import ParameterError, Quantity, refuse
+from .quantities import PARAMETERS, ParameterError, Quantity, refuse
 from .variables import Variables
 
 
@@ -61,16 +61,22 @@ class Slave(Variables):
         """Check all parameters and start values; refuse with every fault named."""
         if self._failed or self._running:
             return
+        faults = [q.fault(x) for q, x in zip(self.outputs[: self.settable], self.y, strict=False)]
+        faults += [None if isfinite(x) else f"{q.name} = {x!r} {q.unit}" for q, x in self._inputs()]
+        faults += [PARAMETERS[name].fault(x) for name, x in self.parameters().items()]
+        faults += [choice.fault(value) for choice, value in zip(self.choices, self.chosen, strict=True)]
+        faults += [None if isfinite(self.time) else f"start time = {self.time!r} s: wanted a finite time"]
         try:
-            refuse([q.fault(x) for q, x in zip(self.outputs[: self.settable], self.y, strict=False)])
-            refuse(None if isfinite(x) else f"{q.name} = {x!r} {q.unit}" for q, x in self._inputs())
-            refuse([] if isfinite(self.time) else [f"start time = {self.time!r} s: wanted a finite time"])
             self.configure()
+            refuse(faults)
             self.begin()
             self.feed_through()
             refuse(None if isfinite(x) else f"{q.name} = {x!r} {q.unit} at the start" for q, x in self._outputs())
-        except (ParameterError, ArithmeticError, ValueError) as error:
-            self._refuse(f"initialization: {error}")
+        except ParameterError as error:
+            self._refuse("initialization: " + "; ".join(dict.fromkeys([*filter(None, faults), *error.faults])))
+            return
+        except Exception as error:  # of whatever kind: it must not reach the library unprepared (see `_refuse`)
+            self._refuse("initialization: " + "; ".join([*filter(None, faults), repr(error)]))
             return
         self._running, self._stale = True, False
 
@@ -89,7 +95,7 @@ class Slave(Variables):
                 self.feed_through()
             if not isfinite(sum(self.y)):
                 refuse(None if isfinite(x) else f"{q.name} = {x!r} {q.unit}" for q, x in self._outputs())
-        except (StepError, ArithmeticError, ValueError) as error:
+        except Exception as error:  # of whatever kind: the step is refused, and the component as it was before
             memory, self.y[:], self.time = kept
             self.recall(memory)
             what = f"step of {step_size:g} s from t = {current_time:g} s: {error}"
@@ -130,7 +136,7 @@ class Slave(Variables):
                 self.begin()
             self.feed_through()
             good = isfinite(sum(self.y))
-        except (ParameterError, ArithmeticError, ValueError):
+        except Exception:  # said at the end of initialization or at the next step, see above
             good = False
         if good:
             self._stale = False
@@ -163,7 +169,7 @@ class Slave(Variables):
             if self._running:
                 self.recall(state["memory"])
                 self.configure()
-        except (LookupError, TypeError, ValueError) as error:
+        except Exception as error:  # of whatever kind
             self._refuse(f"setting the state: wanted one that this FMU has given, got {error!r}")
 
     @staticmethod

@@ -11,7 +11,7 @@ from fmpy import read_model_description
 from fmpy.fmi1 import FMICallException
 from fmpy.fmi2 import FMU2Slave
 
-from analysis.component import _callbacks, _logs
+from analysis.component import callbacks, logs
 
 OK, WARNING, DISCARD, ERROR, FATAL = range(5)
 
@@ -26,11 +26,11 @@ class Host:
         self.inputs = [v.name for v in description.modelVariables if v.causality == "input"]
         identifier = description.coSimulation.modelIdentifier
         self.log: list[str] = []
-        _logs[id(self.log)] = self.log
+        logs[id(self.log)] = self.log
         self.fmu = FMU2Slave(
             guid=description.guid, modelIdentifier=identifier, unzipDirectory=str(folder), instanceName=identifier
         )
-        self.fmu.instantiate(callbacks=_callbacks(id(self.log)), loggingOn=True)
+        self.fmu.instantiate(callbacks=callbacks(id(self.log)), loggingOn=True)
 
     def status(self, function: str, *arguments: Any) -> int:
         """Call fmi2<function> on the instance."""
@@ -96,4 +96,4 @@ class Host:
 
     def free(self) -> None:
         self.fmu.freeInstance()
-        del _logs[id(self.log)]
+        del logs[id(self.log)]

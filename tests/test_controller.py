@@ -16,11 +16,12 @@ from numpy.testing import assert_allclose
 from scipy.linalg import expm, solve_continuous_are
 
 from fmu_src.controller import design as designs
-from fmu_src.controller.design import DEFAULT_SPAN, Design, design, store, stored
+from fmu_src.controller.design import Design, design, store, stored
 from fmu_src.controller.halfcar import HalfCar, half_car_state, strut_forces
 from fmu_src.controller.law import ControlParameters, control_law
 from fmu_src.controller.lqr_controller import LqrController
 from fmu_src.controller.riccati import finite_horizon, infinite_horizon, riccati_rate
+from fmu_src.quantities import ParameterError
 from fmu_src.vehicle.linear import linearized
 from fmu_src.vehicle.parameters import Car
 
@@ -35,7 +36,7 @@ def matrices() -> tuple[Array, Array, Array, Array]:
 
 @pytest.fixture(scope="module")
 def default_design() -> Design:
-    return design(HalfCar(), infinite=True, span=DEFAULT_SPAN)
+    return design(HalfCar(), infinite=True, span=float("inf"))
 
 
 def test_scalar_lqr_has_its_closed_form() -> None:
@@ -100,7 +101,7 @@ def test_gains_between_table_entries_are_right(
     default_design: Design, matrices: tuple[Array, Array, Array, Array]
 ) -> None:
     assert default_design.finite is not None
-    s = np.random.default_rng(3).uniform(0, DEFAULT_SPAN, 200)
+    s = np.random.default_rng(3).uniform(0, 4.0, 200)
     s.sort()
     L = finite_horizon(*matrices, np.array([0.0, *s]))[1:]
     expected = np.array([(-matrices[1].T @ each).ravel() for each in L])
@@ -111,8 +112,8 @@ def test_gains_between_table_entries_are_right(
 def test_a_stored_design_is_read_back_bit_for_bit(default_design: Design, tmp_path: Path) -> None:
     store(default_design, tmp_path)
     assert stored(tmp_path) == default_design
-    assert default_design.serves(HalfCar(), "finite", DEFAULT_SPAN)
-    assert not default_design.serves(HalfCar(), "finite", DEFAULT_SPAN + 0.1)
+    assert default_design.serves(HalfCar(), "finite", 1e6)
+    assert not design(HalfCar(), infinite=False, span=1.0).serves(HalfCar(), "finite", 1.1)
     assert not default_design.serves(HalfCar(lam=1e9), "infinite", 1.0)
 
 
@@ -166,3 +167,27 @@ def test_the_shipped_design_is_that_of_the_default_parameters(dist: Path, defaul
         shipped = json.loads(archive.read(f"resources/{designs.FILE_NAME}"))
     assert shipped["car"] == asdict(HalfCar())
     assert_allclose(shipped["infinite"], np.array(default_design.infinite), rtol=1e-9)
+    assert default_design.finite is not None
+    assert shipped["finite"]["settled"]
+    assert_allclose(shipped["finite"]["gains"], default_design.finite.gains, rtol=1e-9, atol=1e-6)
+    assert_allclose(shipped["finite"]["gains"][-1], shipped["infinite"], rtol=1e-9)
+
+
+@pytest.mark.parametrize("lam", [0.0, 1e6, 1e12, 1e14])
+def test_the_gain_table_is_as_fine_as_the_control_is_fast(lam: float) -> None:
+    car = HalfCar(lam=lam)
+    A, B, Q, R = (np.array(M) for M in (car.A, car.B, car.Q, car.R))
+    table = design(car, infinite=False, span=1.0).finite
+    assert table is not None
+    s = np.sort(np.random.default_rng(4).uniform(0, 1.0, 50))
+    expected = [(-B.T @ each).ravel() for each in finite_horizon(A, B, Q, R, np.array([0.0, *s]))[1:]]
+    got = [table.gain(x) for x in s]
+    assert np.abs(np.array(got) - expected).max() <= 1e-7 * np.abs(expected).max()
+
+
+def test_a_control_too_fast_for_any_table_is_refused_with_the_reason() -> None:
+    with pytest.raises(ParameterError, match="leaves the finite numbers"):
+        design(HalfCar(lam=1e30), infinite=False, span=10.0)
+    undamped = HalfCar(lam=0.0, b1=0.0, b2=0.0)  # L = 0 for ever, but nothing says so
+    with pytest.raises(ParameterError, match=r"lambda, H1, T: .* wanted a slower or shorter control"):
+        design(undamped, infinite=False, span=1e5)

@@ -10,26 +10,35 @@ import json
 from bisect import bisect_right
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
+from ..quantities import ParameterError
 from .halfcar import HalfCar
 from .riccati import finite_horizon, infinite_horizon, riccati_rate
+
+if TYPE_CHECKING:
+    from .riccati import Array
 
 Gain = tuple[float, ...]
 """K (2 × 4), row after row."""
 
 FILE_NAME = "lqr_design.json"
-SPACING = 2.5e-3  # s; the cubic between two entries is then right to 2e-8 of the gain
-DEFAULT_SPAN = 2.5  # s of time to go that the stored table covers
+# Of the fastest closed-loop time constant: the cubic between two entries is then right to 2e-8 of the gain.
+RESOLUTION = 0.03
+
+# Slowest closed-loop time constants to go: from there on the gain changes by less than e^-32.
+SETTLED = 16.0
+MOST_ENTRIES = 20_000
 
 
 @dataclass(frozen=True, slots=True)
 class GainTable:
-    """K(s) and dK/ds at times to go s [s]; a cubic between them that has both."""
+    """K(s) and dK/ds at times to go s [s]; a cubic between them that has both, and the last gain beyond."""
 
     to_go: tuple[float, ...]
     gains: tuple[Gain, ...]
     slopes: tuple[Gain, ...]
+    settled: bool  # whether the last gain is that of all longer times to go
 
     def gain(self, s: float) -> Gain:
         """K (2 × 4, row after row) at the time to go s; s is taken into the table's range."""
@@ -57,7 +66,7 @@ class Design:
         forever, table = data["infinite"], data["finite"]
         if table is not None:
             gains, slopes = (tuple(map(tuple, table[key])) for key in ("gains", "slopes"))
-            table = GainTable(tuple(table["to_go"]), gains, slopes)
+            table = GainTable(tuple(table["to_go"]), gains, slopes, table["settled"])
         return cls(HalfCar(**data["car"]), None if forever is None else tuple(forever), table)
 
     def serves(self, car: HalfCar, horizon: str, span: float) -> bool:
@@ -78,18 +87,36 @@ def design(car: HalfCar, *, infinite: bool, span: float | None) -> Design:
 
     A, B, Q, R = (np.array(M) for M in (car.A, car.B, car.Q, car.R))
     forever = tuple(infinite_horizon(A, B, Q, R)[1].ravel().tolist()) if infinite else None
-    table = None
-    if span is not None:
-        to_go = np.linspace(0.0, span, max(2, round(span / SPACING) + 1))
-        L = finite_horizon(A, B, Q, R, to_go)
-        slopes = np.array([riccati_rate(each, A, B, Q, R) for each in L])
-        K, dK = (-np.linalg.solve(R, B.T) @ each for each in (L, slopes))  # K = −R⁻¹ Bᵀ L
-        table = GainTable(
-            tuple(to_go.tolist()),
-            tuple(tuple(k.ravel().tolist()) for k in K),
-            tuple(tuple(k.ravel().tolist()) for k in dK),
-        )
+    table = None if span is None else _gain_table(A, B, Q, R, span)
     return Design(car, forever, table)
+
+
+def _gain_table(A: Array, B: Array, Q: Array, R: Array, span: float) -> GainTable:
+    """K(s) up to the span [s], or to where it has settled, on a grid that its fastest change asks for."""
+    import numpy as np
+    from scipy.linalg import solve_continuous_are
+
+    try:
+        closed = A - B @ np.linalg.solve(R, B.T @ solve_continuous_are(A, B, Q, R))
+    except np.linalg.LinAlgError:  # no damping and no weight: L does not settle
+        closed = A
+    poles = np.linalg.eigvals(closed)
+    slowest = -poles.real.max()
+    reach = min(span, SETTLED / slowest) if slowest > 0.0 else span
+    entries = 2 + int(min(reach * np.abs(poles).max() / RESOLUTION, 2.0 * MOST_ENTRIES))
+    if entries > MOST_ENTRIES:
+        raise ParameterError(
+            [
+                f"lambda, H1, T: {span:g} s of control with poles up to {np.abs(poles).max():.3g}/s: wanted a slower "
+                f"or shorter control, whose gain table has at most {MOST_ENTRIES} entries"
+            ]
+        )
+    to_go = np.linspace(0.0, reach, entries)
+    L = finite_horizon(A, B, Q, R, to_go)
+    rates = np.array([riccati_rate(each, A, B, Q, R) for each in L])
+    K, dK = (-np.linalg.solve(R, B.T) @ each for each in (L, rates))  # K = −R⁻¹ Bᵀ L
+    gains, slopes = (tuple(tuple(k.ravel().tolist()) for k in table) for table in (K, dK))
+    return GainTable(tuple(to_go.tolist()), gains, slopes, settled=bool(reach < span))
 
 
 def store(made: Design, folder: Path) -> None:

@@ -47,9 +47,12 @@ class LqrController(Slave):
             return design(p.car, infinite=p.horizon == "infinite", span=span if p.horizon == "finite" else None)
         except ImportError as missing:
             raise ParameterError(
-                f"no design is stored for these parameters ({', '.join(HALF_CAR)}, horizon = {p.horizon}, "
-                f"{span:g} s of control), and computing one needs a package that is not installed: {missing.name}. "
-                "Install 'control' (it brings numpy and scipy) into the Python that runs this FMU, or keep the defaults"
+                [
+                    f"no design is stored for these parameters ({', '.join(HALF_CAR)}, horizon = {p.horizon}, "
+                    f"{span:g} s of control), and computing one needs a package that is not installed: {missing.name}. "
+                    "Install 'control' (it brings numpy and scipy) into the Python that runs this FMU, or keep the "
+                    "defaults"
+                ]
             ) from missing
 
     def memory(self) -> list[Any]:

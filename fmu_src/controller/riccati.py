@@ -7,6 +7,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from ..quantities import ParameterError
+
 if TYPE_CHECKING:
     import numpy as np
 
@@ -29,15 +31,21 @@ def finite_horizon(A: Array, B: Array, Q: Array, R: Array, to_go: Array) -> Arra
     n = len(A)
     # L scales with Q; an absolute tolerance below its smallest meaningful entry
     scale = np.max(np.abs(Q)) or 1.0
-    solution = solve_ivp(
-        lambda s, y: riccati_rate(y.reshape(n, n), A, B, Q, R).ravel(),
-        (to_go[0], to_go[-1]),
-        np.zeros(n * n),
-        method="DOP853",
-        t_eval=to_go,
-        rtol=1e-12,
-        atol=1e-16 * scale,
-    )
+    try:
+        with np.errstate(over="raise", invalid="raise"):
+            solution = solve_ivp(
+                lambda s, y: riccati_rate(y.reshape(n, n), A, B, Q, R).ravel(),
+                (to_go[0], to_go[-1]),
+                np.zeros(n * n),
+                method="DOP853",
+                t_eval=to_go,
+                rtol=1e-12,
+                atol=1e-16 * scale,
+            )
+    except FloatingPointError as error:
+        raise ParameterError([f"lambda, H1: the Riccati equation leaves the finite numbers: {error}"]) from error
+    if not solution.success:
+        raise ParameterError([f"lambda, H1, T: the Riccati equation cannot be integrated: {solution.message}"])
     L = solution.y.T.reshape(-1, n, n)
     return 0.5 * (L + L.transpose(0, 2, 1))
 

@@ -16,7 +16,7 @@ from math import cos, inf, pi, sin
 
 from ..quantities import PARAMETERS, Choice, refuse
 
-SNAP = 1e-11  # s; a time this close below a corner is the corner: n·h and a sum of delays differ by round-off
+SNAP = 1e-9  # s; a time this close below a corner is the corner: sums of steps and of delays differ by round-off
 
 PROFILE = Choice(
     name="profile",

@@ -67,7 +67,8 @@ def equations_of_motion(car: Car, sin: Callable[..., Any] = math.sin, cos: Calla
         N22 = cp2 * (h22 - z2 + tilt) + bp2 * (dh22 - dz2 + dtilt)
 
         # (3.5), (3.7): the couplings of ψ and ψ2 have the signs of ψ2 positive like ψ; the print mixes both senses.
-        # (3.6): its ż term is 2 (b2 b − b1 a) cos φ ż, as (3.1) and the symmetry of damping ask; the print lacks the 2.
+        # (3.6): so have its terms in ψ̇2 and ψ2, against the print; and its ż term is 2 (b2 b − b1 a) cos φ ż, as (3.1)
+        # and the symmetry of damping ask: the print lacks the 2.
         F1, F2, roll2 = F11 + F12, F21 + F22, s0 * (F21 - F22)
         roll, gyro = s1 * (F11 - F12) + roll2, Jy_Jz * sin_psi * cos_psi * dphi
         q_double_dot = (

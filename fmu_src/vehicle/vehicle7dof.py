@@ -10,7 +10,6 @@ from ..integrate import RoadWithin, Vector, cubic_road, rk4, straight_road
 from ..quantities import (
     ACCELERATIONS,
     FORCES,
-    PARAMETERS,
     ROAD,
     ROAD_HEIGHTS,
     ROAD_RATES,
@@ -18,7 +17,6 @@ from ..quantities import (
     STRUT_TRAVELS,
     TYRE_FORCES,
     Choice,
-    refuse,
 )
 from ..slave import Slave, StepError
 from .equations import equations_of_motion
@@ -51,7 +49,6 @@ class Vehicle7DOF(Slave):
     def configure(self) -> None:
         p = self.parameters()
         h_max, (sampling,) = p.pop("h_max"), self.chosen
-        refuse([PARAMETERS["h_max"].fault(h_max), SAMPLING.fault(sampling)])
         self._h_max, self._sampled_at_end = h_max, sampling == "end"
         self._motion = equations_of_motion(Car(**p))
 
