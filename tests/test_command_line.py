@@ -188,7 +188,7 @@ BAD: dict[str, tuple[Callable[[Path], object], str, str]] = {
     "no run to report": (nothing, "report none", "none: wanted a run folder"),
     "no table": (lambda w: (w / "run/trajectory.csv").unlink(), "check run", r"run/trajectory\.csv: cannot be read"),
     "text in table": (write("run/trajectory.csv", "time,m\n0,1\n1,x\n"), "check run", "row 3, column 'm': .* got 'x'"),
-    "states missing": (write("run/trajectory.csv", "time,m\n0,1\n1,1\n"), "check run", "'body.heave' is not in"),
+    "states missing": (write("run/trajectory.csv", "time,m\n0,1\n1,1\n"), "check run", "the run cannot be checked"),
     "no record": (write("run/run.json", "{"), "check run", r"run/run\.json: cannot be read"),
     "no step": (lambda w: change_record(w / "run", lambda r: r["scenario"].pop("step")), "check run", "wanted .*step"),
 }  # fmt: skip

@@ -58,7 +58,7 @@ def test_everything_that_is_set_is_read(tmp_path: Path) -> None:
         step=0.002,
         coupling="jacobi",
         record=("body.heave", "m"),
-        parameters={"profile": "fourier", "A_nu[3]": 0.01, "m": 900.0, "enabled": False},
+        parameters={"profile": "fourier", "A_nu[3]": 0.01, "m": 900.0, "enabled": False, "road_sampling": "start"},
         start={"body.roll": math.radians(1.0), "der(body.heave)": -0.125},
     )
 
@@ -97,10 +97,11 @@ def test_the_unit_that_a_message_suggests_is_accepted(tmp_path: Path) -> None:
     assert scenario.parameters == {"road_sampling": "end", **{q.name: q.start for q in PARAMETERS.values()}}
 
 
-def test_gauss_seidel_samples_the_road_at_the_end_of_a_step_unless_told_otherwise(tmp_path: Path) -> None:
+def test_the_road_is_sampled_as_the_coupling_steps_it_and_the_other_way_is_refused(tmp_path: Path) -> None:
     assert read(tmp_path, "[parameters]\nm = 900").parameters["road_sampling"] == "end"
-    assert read(tmp_path, '[parameters]\nroad_sampling = "start"').parameters["road_sampling"] == "start"
-    assert read(tmp_path, '[simulation]\ncoupling = "jacobi"').parameters == {}
+    assert read(tmp_path, '[simulation]\ncoupling = "jacobi"').parameters == {"road_sampling": "start"}
+    ((line, said),) = faults(tmp_path, '[parameters]\nroad_sampling = "start"')
+    assert (line, said) == (2, "road_sampling = 'start': coupling = 'gauss-seidel' wants 'end'")
 
 
 # ------------------------------------------------------------------ a run.json is a scenario again

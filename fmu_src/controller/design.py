@@ -73,9 +73,9 @@ class Design:
         """Whether this design holds the gains for this car, horizon and span [s] of time to go."""
         if car != self.car:
             return False
-        return (
-            self.infinite is not None if horizon == "infinite" else bool(self.finite and span <= self.finite.to_go[-1])
-        )
+        if horizon == "infinite":
+            return self.infinite is not None
+        return self.finite is not None and (self.finite.settled or span <= self.finite.to_go[-1])
 
 
 def design(car: HalfCar, *, infinite: bool, span: float | None) -> Design:
