@@ -105,15 +105,15 @@ def _install(extras: list[str]) -> None:
 
 
 # ---------------------------------------------------------------------------------------------------- FMUs
-def build(quiet: bool = False) -> None:
-    """Build dist/*.fmu, their sets for the FMI Cross-Check and VehicleOnRoad.ssp, unless younger than their sources."""
+def build() -> None:
+    """Build the FMUs, their cross-check sets, the .ssp that wires them and the container, unless up to date."""
     fresh = _content_hash([PACKAGE, *(ROOT / name for name in ("build.py", "constraints.txt", "LICENSE"))])
     stamp = DIST / "sources.sha256"
-    made = [DIST / "VehicleOnRoad.ssp", *(DIST / f"{model}.fmu" for model in MODELS)]
+    made = [DIST / "VehicleOnRoad.ssp", DIST / "VehicleOnRoad.fmu", *(DIST / f"{model}.fmu" for model in MODELS)]
     if stamp.is_file() and stamp.read_text() == fresh and all(path.is_file() for path in made):
         return
-    if not quiet:
-        print(f"Building the FMUs in {DIST} ...", file=sys.stderr, flush=True)
+    print(f"Building the FMUs in {DIST} ...", file=sys.stderr, flush=True)
+    from fmu_src.export.container import container_contents
     from fmu_src.export.cross_check import write_cross_check
 
     DIST.mkdir(exist_ok=True)
@@ -125,6 +125,7 @@ def build(quiet: bool = False) -> None:
     ssp = {"SystemStructure.ssd": SYSTEM / "SystemStructure.ssd"}
     ssp |= {f"resources/{model}.fmu": DIST / f"{model}.fmu" for model in MODELS}
     write_archive(DIST / "VehicleOnRoad.ssp", {name: path.read_bytes() for name, path in ssp.items()})
+    write_archive(DIST / "VehicleOnRoad.fmu", container_contents(DIST / "VehicleOnRoad.ssp"))
     stamp.write_text(fresh)
 
 
@@ -243,7 +244,7 @@ def main() -> int:
 
     if options.verb == "clean":
         return clean()
-    enter_environment(extras=["test"] if options.verb == "test" else [])
+    enter_environment(extras=["interop", "test"] if options.verb == "test" else [])
     match options.verb:
         case "run":
             return run(options.scenario, options.out)
