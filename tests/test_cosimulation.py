@@ -174,6 +174,37 @@ def test_all_faults_of_parameters_come_back_in_the_fmus_own_words() -> None:
         simulate(replace(read_scenario("bump"), parameters=parameters))
 
 
+def test_whatever_a_component_raises_at_the_start_is_a_refusal_with_its_words() -> None:
+    undamped: Parameters = {"lambda": 0.0, "b1": 0.0, "b2": 0.0, "horizon": "infinite"}
+    for parameters in (undamped, {"s2": 1e200}):
+        with pytest.raises(CosimError, match="initialization: "):
+            simulate(replace(read_scenario("bump"), parameters={**parameters, "enabled": True}))
+
+
+@pytest.mark.parametrize("v0", [9.0, 11.0, 13.9])
+def test_corners_within_steps_are_judged_by_their_own_tolerance(v0: float) -> None:
+    bump = read_scenario("bump")
+    deviation, energy = check(simulate(replace(bump, stop_time=1.0, parameters={**bump.parameters, "v0": v0})))
+    assert deviation.holds
+    assert energy.holds
+    assert deviation.tolerance == 1e-3
+
+
+def test_no_tolerance_lets_a_wrong_run_pass_however_long_its_steps() -> None:
+    coarse = replace(read_scenario("bump"), coupling="jacobi", step=0.02, parameters={"road_sampling": "start"})
+    assert not check(simulate(coarse))[0].holds
+
+
+@pytest.mark.parametrize(
+    ("start", "step", "stop"), [(0.0, 0.1, 0.3), (1e5, 1e-3, 1e5 + 0.0505), (1e6, 1e-3, 1e6 + 0.1)]
+)
+def test_the_last_time_is_the_stop_time_and_all_times_differ(start: float, step: float, stop: float) -> None:
+    parameters: Parameters = {"profile": "flat", "enabled": False}
+    run = simulate(Scenario(name="late", start_time=start, step=step, stop_time=stop, parameters=parameters)).trajectory
+    assert run.time[-1] == stop
+    assert np.all(np.diff(run.time) > 0.4 * step)
+
+
 def test_unpacked_folders_are_removed_after_success_and_after_failure(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
