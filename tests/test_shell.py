@@ -190,8 +190,8 @@ def test_a_step_that_would_never_end_is_refused(load: Loader) -> None:
         (  # faults of start values, of single parameters and of the whole car, all at once
             "Vehicle7DOF",
             {"body.roll": 3.0, "h_max": 0.0, "m": -1.0, "m21": 21.0},
-            "body.roll = 3.0 rad: wanted a finite number in [-1.5708, 1.5708]; m = -1.0 kg: wanted a finite number > 0; "
-            "h_max = 0.0 s: wanted a finite number > 0; m21 = 21.0 kg, m22 = 22.0 kg: wanted equal masses",
+            "body.roll = 3.0 rad: wanted a finite number in [-1.5708, 1.5708]; m = -1.0 kg: wanted a finite number > 0"
+            "; h_max = 0.0 s: wanted a finite number > 0; m21 = 21.0 kg, m22 = 22.0 kg: wanted equal masses",
         ),
         ("LqrController", {"lambda": 0.0, "b1": 0.0, "b2": 0.0, "H1": 1e200}, "initialization: "),
         ("Vehicle7DOF", {"a": 0.0, "b": 0.0}, "wheelbase"),
