@@ -40,6 +40,7 @@ class Variables(Fmi2Slave):
     log_categories = LOG_CATEGORIES
     author = "Bertolino–Bakša stability of motor vehicles: the developers"
     license = "MIT"
+    version = "0.1.0"
     copyright = "© the developers"
     default_experiment = DefaultExperiment(start_time=0.0, stop_time=5.0, step_size=1e-3)
 

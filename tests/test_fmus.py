@@ -7,15 +7,18 @@ import hashlib
 import os
 import subprocess
 import sys
+import tomllib
 import venv
 import zipfile
 from pathlib import Path
 
 import pytest
 from conftest import ROOT
+from fmpy import read_model_description
 from fmpy.validation import validate_fmu
 
 import build
+from analysis.scenario import read_scenario
 from fmu_src.quantities import TABLE
 
 MODELS = list(build.MODELS)
@@ -33,6 +36,17 @@ def test_the_same_sources_give_the_same_bytes(dist: Path, model: str, tmp_path: 
     assert len(digests) == 1
 
 
+def test_version_and_default_experiment_are_those_of_the_project_and_of_the_default_scenario(dist: Path) -> None:
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    bump = read_scenario("bump")
+    for model in MODELS:
+        description = read_model_description(str(dist / f"{model}.fmu"))
+        experiment = description.defaultExperiment
+        assert description.version == project["version"]
+        times = [float(x) for x in (experiment.startTime, experiment.stopTime, experiment.stepSize)]
+        assert times == [bump.start_time, bump.stop_time, bump.step]
+
+
 def test_the_ssp_holds_the_very_fmus(dist: Path) -> None:
     with zipfile.ZipFile(dist / "VehicleOnRoad.ssp") as archive:
         for model in MODELS:
@@ -40,8 +54,6 @@ def test_the_ssp_holds_the_very_fmus(dist: Path) -> None:
 
 
 def test_every_variable_has_the_unit_and_words_of_the_table(dist: Path) -> None:
-    from fmpy import read_model_description
-
     for model in MODELS:
         for v in read_model_description(str(dist / f"{model}.fmu")).modelVariables:
             if v.type == "Real":
