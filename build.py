@@ -233,8 +233,8 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     verbs = parser.add_subparsers(dest="verb", required=True, metavar="VERB")
     verb = verbs.add_parser("run", help="co-simulate a scenario, check it, write the report; default: the paper's bump")
-    verb.add_argument("scenario", nargs="?", default="bump", help="name of a built-in scenario, or a .toml file")
-    verb.add_argument("--out", type=Path, help="run folder (default: runs/SCENARIO)")
+    verb.add_argument("scenario", nargs="?", default="bump", help="a built-in scenario, a .toml file, or a run.json")
+    verb.add_argument("-o", "--out", type=Path, help="run folder (default: runs/SCENARIO, replaced if it is a run)")
     verbs.add_parser("test", help="lint, types, import contracts, tests; further arguments go to pytest")
     for name, what in (("build", "build dist/*.fmu and the .ssp"), ("bench", "benchmarks"), ("clean", "tidy up")):
         verbs.add_parser(name, help=what)
@@ -258,4 +258,7 @@ def main() -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    try:
+        sys.exit(main())
+    except KeyboardInterrupt:
+        sys.exit("interrupted; the next call will take up where this one was stopped")

@@ -5,9 +5,11 @@ from __future__ import annotations
 import argparse
 import dataclasses
 import json
+import os
 import signal
 import sys
 from pathlib import Path
+from typing import NoReturn
 
 from fmu_src.quantities import ParameterError
 
@@ -76,6 +78,8 @@ def _run(options: argparse.Namespace) -> int:
     scenario = read_scenario(options.scenario)
     target = options.out or Path("runs") / scenario.name
     with new_run_folder(target) as folder:
+        if target.exists():
+            print(f"{target}: an older run is there and will be replaced", file=sys.stderr)
         run = simulate(scenario, progress=True)
         _compare_fmus(options.scenario, run)
         write_run(run, folder)
@@ -134,5 +138,19 @@ def _report(options: argparse.Namespace) -> int:
     return 0
 
 
+def _leave(status: int) -> NoReturn:
+    """End the process without the exit handlers of C libraries.
+
+    PythonFMU's library frees its interpreter state in one of them and uses it again in a later one, which now and then
+    aborts a process that has done its work.
+    """
+    sys.stdout.flush()
+    sys.stderr.flush()
+    os._exit(status)
+
+
 if __name__ == "__main__":
-    sys.exit(main())
+    try:
+        _leave(main())
+    except SystemExit as leaving:  # of --help, of a wrong option, of SIGTERM
+        _leave(leaving.code if isinstance(leaving.code, int) else 0)
