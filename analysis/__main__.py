@@ -28,6 +28,9 @@ def main(arguments: list[str] | None = None) -> int:
     except (InputError, CosimError, ParameterError) as error:
         print(f"error: {error}", file=sys.stderr)
         return 2
+    except OSError as error:
+        print(f"error: {error}", file=sys.stderr)
+        return 2
     except KeyboardInterrupt:
         print("interrupted; nothing was written", file=sys.stderr)
         return 128 + signal.SIGINT

@@ -22,6 +22,7 @@ from fmu_src.road.profiles import HARMONICS, PROFILE, Road, RoadParameters, road
 from fmu_src.vehicle.equations import equations_of_motion
 from fmu_src.vehicle.parameters import Car
 
+from .errors import InputError
 from .scenario import Scenario
 from .trajectory import Array
 
@@ -121,5 +122,7 @@ def integrate(
         within = (times > begin) & (times <= end)
         sampled = np.union1d(times[within], end)
         solution = solve_ivp(rate, (begin, end), x, method="DOP853", rtol=rtol, atol=rtol * 1e-3, t_eval=sampled)
+        if not solution.success:
+            raise InputError(f"from t = {begin:g} s the motion cannot be integrated: {solution.message}")
         states[within], x = solution.y.T[: np.count_nonzero(within)], solution.y[:, -1]
     return states
