@@ -1,0 +1,69 @@
+"""The car and its road in the form that the methods work on: the one door through which they enter the analysis."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fmu_src.quantities import STATES
+from fmu_src.road.profiles import SNAP, RoadParameters
+from fmu_src.vehicle.equations import equations_of_motion
+from fmu_src.vehicle.parameters import Car
+
+from .polynomials import Array
+from .signals import Piece, Signal
+from .standard_form import Equations, Function, StandardForm, standard_form
+
+
+def car_form(car: Car, *, gain: Array | None = None, order: int = 5) -> StandardForm:
+    """The car: states x = (q, q̇) (14), inputs w = (h, ḣ) (8); with a gain (4, 14), under actuator forces u = −gain x."""
+    return standard_form(_car_equations(car, gain), [q.name for q in STATES], 8, order=order)
+
+
+def _car_equations(car: Car, gain: Array | None) -> Equations:
+    rows = [] if gain is None else gain.tolist()
+
+    def equations(x: Sequence[Any], w: Sequence[Any], sine: Function, cosine: Function) -> Sequence[Any]:
+        u = [sum((xi * -k for k, xi in zip(row, x, strict=True) if k), 0.0) for row in rows] or [0.0] * 4
+        accelerations, _, _ = equations_of_motion(car, sine, cosine)(x[:7], x[7:], u, w[:4], w[4:])
+        return [*x[7:], *accelerations]
+
+    return equations
+
+
+def road_signal(road: RoadParameters, begin: float = 0.0) -> Signal:
+    """w = (h, ḣ) (8) under the wheels fl, fr, rl, rr from `begin` [s] on, for ever."""
+    shape = road.shape()
+    delays = [d if on else np.inf for d, on in zip(road.delays, road.excited, strict=True)]
+    corners = sorted({d + c for d in delays for c in shape.corners if begin < d + c < np.inf})
+    starts = [begin, *(later for earlier, later in pairwise([begin, *corners]) if later - earlier > SNAP)]
+    exponents, waves = _harmonics(road)
+    pieces = []
+    for start in starts:
+        phases = np.zeros((4, len(exponents)), complex)
+        for wheel, delay in enumerate(delays):
+            if delay - SNAP <= start < delay + shape.end - SNAP or (road.profile == "step" and start >= delay - SNAP):
+                phases[wheel] = waves * np.exp(exponents * (start - delay))
+        pieces.append(Piece(start, exponents, np.concatenate([phases, phases * exponents])))
+    return Signal(tuple(pieces))
+
+
+def _harmonics(road: RoadParameters) -> tuple[NDArray[np.complex128], NDArray[np.complex128]]:
+    """Exponents [1/s] and complex amplitudes [m] of the profile's height over the time since a wheel met it."""
+    match road.profile:
+        case "step":
+            return np.zeros(1, complex), np.array([road.A], complex)
+        case "fourier":
+            amplitudes = road.amplitudes
+        case "bump" | "sine":
+            amplitudes = (road.A,)
+        case _:
+            amplitudes = ()
+    nu = np.array([k for k, A in enumerate(amplitudes, start=1) if A])
+    half = np.array([A for A in amplitudes if A]) / 2j  # sin = (exp(i·) − exp(−i·))/2i
+    omega = 1j * road.omega * nu
+    return np.concatenate([omega, -omega]), np.concatenate([half, -half])
