@@ -20,7 +20,7 @@ from .standard_form import Equations, Function, StandardForm, standard_form
 
 
 def car_form(car: Car, *, gain: Array | None = None, order: int = 5) -> StandardForm:
-    """The car: states x = (q, q̇) (14), inputs w = (h, ḣ) (8); with a gain (4, 14), under actuator forces u = −gain x."""
+    """The car: states x = (q, q̇) (14), inputs w = (h, ḣ) (8); with a gain (4, 14), under forces u = −gain x."""
     return standard_form(_car_equations(car, gain), [q.name for q in STATES], 8, order=order)
 
 
