@@ -1,8 +1,8 @@
 """Numbers that carry a power series in several variables, cut at an order: equations evaluated with them are expanded.
 
 A monomial is the sorted tuple of its variables' indices, so () is the constant, (1, 1, 2) stands for x1² x2, and the
-coefficient of a monomial is the entry of a tensor with those indices. Coefficients may be of any kind that adds and
-multiplies: floats, fractions, sympy expressions.
+coefficient of a monomial is the entry of a tensor with those indices. Coefficients may be of any kind that adds,
+multiplies and is divided by integers: floats, fractions, sympy expressions, balls.
 """
 
 from __future__ import annotations
@@ -10,7 +10,6 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from fractions import Fraction
 from typing import Any
 
 Monomial = tuple[int, ...]
@@ -62,9 +61,9 @@ class PowerSeries:
     __rmul__ = __mul__
 
 
-def variables(count: int, order: int) -> list[PowerSeries]:
-    """x0, x1, … as series up to the order."""
-    return [PowerSeries({(i,): 1}, order) for i in range(count)]
+def variables(count: int, order: int, one: Any = 1.0) -> list[PowerSeries]:
+    """x0, x1, … as series up to the order; `one` is the unit of the coefficients' kind."""
+    return [PowerSeries({(i,): one}, order) for i in range(count)]
 
 
 def sin(x: PowerSeries) -> PowerSeries:
@@ -81,14 +80,15 @@ def _trigonometric(x: PowerSeries, derivatives: Sequence[int]) -> PowerSeries:
     """Σ f⁽ᵏ⁾(0) xᵏ/k!, with the derivatives repeating themselves."""
     if () in x.terms:
         raise ValueError("sine and cosine are expanded at 0 only: wanted a series without a constant")
-    return _substituted([Fraction(derivatives[k % 4], math.factorial(k)) for k in range(x.order + 1)], x)
+    zero = next(iter(x.terms.values()), 0.0) * 0  # of the coefficients' kind
+    return _substituted([(zero + derivatives[k % 4]) / math.factorial(k) for k in range(x.order + 1)], x)
 
 
 def _substituted(coefficients: Sequence[Any], x: PowerSeries) -> PowerSeries:
     """Σ coefficients[k] xᵏ by Horner's rule."""
     value = PowerSeries({}, x.order)
     for c in reversed(coefficients):
-        value = value * x + c if c else value * x
+        value = value * x if c == 0 else value * x + c
     return value
 
 

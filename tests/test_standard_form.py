@@ -39,8 +39,8 @@ def pendulum(x: Sequence[Any], w: Sequence[Any], sine: Any, cosine: Any) -> Sequ
 # ---------------------------------------------------------------------------------------------------- power series
 def test_series_of_known_functions() -> None:
     x, y = variables(2, 7)
-    assert float(sin(x).terms[(0,) * 7]) == pytest.approx(-1 / math.factorial(7))
-    assert float(cos(x).terms[(0,) * 6]) == pytest.approx(-1 / math.factorial(6))
+    assert sin(x).terms[(0,) * 7] == pytest.approx(-1 / math.factorial(7))
+    assert cos(x).terms[(0,) * 6] == pytest.approx(-1 / math.factorial(6))
     assert (1 / (1 - x)).terms[(0,) * 7] == 1
     one = sin(x + y) * sin(x + y) + cos(x + y) * cos(x + y)
     assert {m for m, value in one.terms.items() if value != 0} == {()}
@@ -54,8 +54,8 @@ def test_the_coefficients_may_be_symbols() -> None:
     import sympy as sp
 
     c = sp.Symbol("c")
-    (x,) = variables(1, 5)
-    assert sp.simplify(sin(x * c).terms[(0,) * 5] - c**5 / 120) == 0
+    (x,) = variables(1, 5, sp.Integer(1))
+    assert sin(x * c).terms[(0,) * 5] == c**5 / 120
 
 
 # ---------------------------------------------------------------------------------------------------- polynomials
