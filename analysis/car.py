@@ -21,10 +21,11 @@ from .standard_form import Equations, Function, StandardForm, standard_form
 
 def car_form(car: Car, *, gain: Array | None = None, order: int = 5) -> StandardForm:
     """The car: states x = (q, q̇) (14), inputs w = (h, ḣ) (8); with a gain (4, 14), under forces u = −gain x."""
-    return standard_form(_car_equations(car, gain), [q.name for q in STATES], 8, order=order)
+    return standard_form(car_equations(car, gain), [q.name for q in STATES], 8, order=order)
 
 
-def _car_equations(car: Car, gain: Array | None) -> Equations:
+def car_equations(car: Any, gain: Array | None) -> Equations:
+    """F(x, w) of a car whose parameters may be any kind of number."""
     rows = [] if gain is None else gain.tolist()
 
     def equations(x: Sequence[Any], w: Sequence[Any], sine: Function, cosine: Function) -> Sequence[Any]:

@@ -37,15 +37,18 @@ def car_of(parameters: Parameters) -> Car:
 
 def road_of(parameters: Parameters) -> Road:
     """The road that these parameters describe; defaults where they are silent."""
+    return road(road_parameters(parameters))
+
+
+def road_parameters(parameters: Parameters) -> RoadParameters:
+    """The parameters of the road among these; defaults where they are silent."""
     names = ("A", "Lambda", "v0", "a", "b", "tau0", "t_start")
     fl, fr, rl, rr = (bool(parameters.get(f"excite_{corner}", True)) for corner in CORNERS)
-    return road(
-        RoadParameters(
-            profile=str(parameters.get(PROFILE.name, PROFILE.start)),
-            amplitudes=tuple(float(parameters.get(name, PARAMETERS[name].start)) for name in HARMONICS),
-            excited=(fl, fr, rl, rr),
-            **{name: float(parameters.get(name, PARAMETERS[name].start)) for name in names},
-        )
+    return RoadParameters(
+        profile=str(parameters.get(PROFILE.name, PROFILE.start)),
+        amplitudes=tuple(float(parameters.get(name, PARAMETERS[name].start)) for name in HARMONICS),
+        excited=(fl, fr, rl, rr),
+        **{name: float(parameters.get(name, PARAMETERS[name].start)) for name in names},
     )
 
 

@@ -1,0 +1,150 @@
+"""Ball arithmetic (python-flint): exact constants, upper bounds, series and matrices of balls.
+
+Everything that a proof rests on is computed with balls that hold the exact value, rounding included. A ball that is not
+finite proves nothing: `above` refuses it.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Any
+
+import numpy as np
+from flint import arb, arb_mat, arb_series, ctx, fmpq
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+Balls = Sequence[Any]
+BITS = 96
+Inputs = Callable[[Any], list[Any]]
+
+
+class NotProvedError(ArithmeticError):
+    """An enclosure is too wide, or not finite, for what was to be proved."""
+
+
+@dataclass(frozen=True, slots=True)
+class ExactSystem:
+    """x' = F(x, w(t)) with nothing rounded.
+
+    equations : F(x, w, sin, cos), its constants balls or exact numbers; n states, m inputs.
+    pieces    : (begin [s], w as a function of the time [s], a ball or a series of balls), in the order of time; the
+                last holds for ever.
+    period    : of w from the last piece's begin on [s]; 0 if w is 0 from there on.
+    """
+
+    n: int
+    m: int
+    equations: Callable[..., Sequence[Any]]
+    pieces: tuple[tuple[fmpq, Inputs], ...]
+    period: fmpq
+
+    def inputs_at(self, t: fmpq) -> Inputs:
+        """w of the piece in which t lies."""
+        return [inputs for begin, inputs in self.pieces if begin <= t][-1]
+
+
+@contextmanager
+def precision(terms: int) -> Iterator[None]:
+    """Work with BITS bits and series of this many terms."""
+    cap, bits = ctx.cap, ctx.prec
+    ctx.cap, ctx.prec = terms, BITS
+    try:
+        yield
+    finally:
+        ctx.cap, ctx.prec = cap, bits
+
+
+def decimal(value: float) -> fmpq:
+    """The number that a float's shortest decimal says, exactly: 0.1 is 1/10."""
+    ratio = Fraction(repr(float(value)))
+    return fmpq(ratio.numerator, ratio.denominator)
+
+
+def above(x: Any) -> float:
+    """A float that is not below |x|. Raises NotProvedError unless that is finite."""
+    value = math.nextafter(float(arb(x).abs_upper()), math.inf)
+    if not value < math.inf:
+        raise NotProvedError(f"no finite bound: {x}")
+    return value
+
+
+def below(x: Any) -> float:
+    """A float that is not above x. Raises NotProvedError unless that is finite."""
+    value = math.nextafter(float(arb(x).lower()), -math.inf)
+    if not abs(value) < math.inf:
+        raise NotProvedError(f"no finite bound: {x}")
+    return value
+
+
+def length(values: Iterable[Any]) -> float:
+    """Upper bound of √(Σ v²)."""
+    return above(sum((v * v for v in values), arb(0)).abs_upper().sqrt())  # v * v may reach below 0: root of the top
+
+
+def sine(x: Any) -> Any:
+    """Sine of a ball or of a series of balls."""
+    return x.sin()
+
+
+def cosine(x: Any) -> Any:
+    """Cosine of a ball or of a series of balls."""
+    return x.cos()
+
+
+def matrix(values: Any) -> arb_mat:
+    """Matrix of exact doubles."""
+    rows = np.asarray(values, dtype=float)
+    return arb_mat(*rows.shape, [arb(v) for v in rows.ravel().tolist()])
+
+
+def column(values: Sequence[Any]) -> arb_mat:
+    """Column of balls."""
+    return arb_mat(len(values), 1, list(values))
+
+
+def magnitudes(m: arb_mat) -> Array:
+    """Upper bounds of the entries' absolute values, as floats."""
+    return np.array([above(v) for v in m.entries()]).reshape(m.nrows(), m.ncols())
+
+
+def rounded(m: arb_mat) -> tuple[Array, float]:
+    """Exact floats near the entries, and a bound of the sum of what is left (hence of its norms)."""
+    entries = m.entries()
+    centre = [float(v.mid()) for v in entries]
+    rest = sum((abs(v - arb(c)) for v, c in zip(entries, centre, strict=True)), arb(0))
+    return np.array(centre).reshape(m.nrows(), m.ncols()), above(rest)
+
+
+def coefficients(series: Any, length: int) -> list[Any]:
+    """The first coefficients of a series (or of a constant), zeros appended."""
+    found = series.coeffs() if isinstance(series, arb_series) else [arb(series)]
+    return [*found, *[arb(0)] * (length - len(found))]
+
+
+def jacobian(system: ExactSystem, x: Balls, w: Balls, *, inputs: bool = False) -> arb_mat:
+    """∂F/∂x (n, n), or ∂F/∂w (n, m), over the balls x and w: one pass with a nilpotent increment for each column."""
+    columns = []
+    with precision(2):
+        for j in range(system.m if inputs else system.n):
+            xs, ws = list(x), list(w)
+            moved = ws if inputs else xs
+            moved[j] = arb_series([moved[j], 1])
+            columns.append([coefficients(rate, 2)[1] for rate in system.equations(xs, ws, sine, cosine)])
+    return arb_mat(columns).transpose()
+
+
+def two_norm(m: Array) -> float | Array:
+    """Upper bound of the spectral norm of float matrices (…, p, q) whose entries are exact.
+
+    With V orthogonal up to round-off, MᵀM is similar to VᵀMᵀMV, and Gershgorin's rows bound that. The products are
+    rounded: each entry by less than 1e-13 of the largest norm in the product, which the last factor covers.
+    """
+    gram = np.swapaxes(m, -1, -2) @ m
+    V = np.linalg.eigh(gram)[1]
+    rotated = np.swapaxes(V, -1, -2) @ gram @ V
+    return np.sqrt(np.abs(rotated).sum(axis=-1).max(axis=-1)) * (1.0 + 1e-11)

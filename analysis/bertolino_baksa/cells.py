@@ -1,0 +1,125 @@
+"""Bounds over short cells of time that no sampling can miss: of e^(At), of the tube's polynomials, of the norm of e.
+
+Between two points a function lies within Δ²/8 sup|f''| of its chord, and a norm on a chord is largest at an end. So all
+bounds here are values at the cells' ends plus a term of second order in the cell's width Δ.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from flint import arb
+from numpy.typing import NDArray
+from scipy.linalg import expm
+
+from .balls import Array, ExactSystem, above, matrix, rounded, two_norm
+from .norms import Metric, Norm
+from .tube import Piece, Tube
+
+CELLS = 12  # per piece, for e^(At) and the growth of perturbations
+FINER = 8  # times as many, for the norm of e
+EPS = 1e-13  # relative: covers the roundings of a polynomial's or a product's value, over the sum of its terms' sizes
+
+
+@dataclass(frozen=True, slots=True)
+class Decay:
+    """e^(At) over the cells: width [s] (N,), ends (N + 1, n, n), and `curve` (N, n, n) ≥ sup |A² e^(At)| Δ²/8."""
+
+    piece: NDArray[np.intp]  # (N,) index of the piece that the cell lies in
+    width: Array
+    ends: Array
+    curve: Array
+    off: float  # bound of the spectral norm of (exact − ends)
+
+    def of(self, norm: Norm) -> Array:
+        """κ (N,) ≥ sup N(e^(At) y)/N(y) over each cell."""
+        inverse, rest = rounded(matrix(norm.T).inv())
+        moved, curve = norm.T @ self.ends @ inverse, np.abs(norm.T) @ self.curve @ np.abs(inverse)
+        off = self._rounding(norm.T, inverse, rest)
+        sizes = np.abs(moved).sum(axis=2).max(axis=1) if norm.largest else two_norm(moved)
+        bend = curve.sum(axis=2).max(axis=1) if norm.largest else np.sqrt((curve**2).sum(axis=(1, 2)))
+        return (np.maximum(sizes[:-1], sizes[1:]) + bend) * (1 + EPS) + off
+
+    def rows(self, norm: Norm) -> Array:
+        """κ_j (N, n) ≥ sup |(e^(At) y)_j|/N(y) over each cell."""
+        inverse, rest = rounded(matrix(norm.T).inv())
+        dual = (lambda m: np.abs(m).sum(axis=2)) if norm.largest else (lambda m: np.sqrt((m**2).sum(axis=2)))
+        sizes, bend = dual(self.ends @ inverse), dual(self.curve @ np.abs(inverse))
+        off = self._rounding(np.eye(len(norm.T)), inverse, rest)
+        return (np.maximum(sizes[:-1], sizes[1:]) + bend) * (1 + EPS) + off
+
+    def at_end(self, metric: Metric, norm: Norm) -> float:
+        """c ≥ ‖e^(AT) y‖_S/N(y) at the end T."""
+        inverse, rest = rounded(matrix(norm.T).inv())
+        last = np.sqrt(((metric.S @ self.ends[-1] @ inverse) ** 2).sum())
+        root = np.sqrt(len(norm.T)) if norm.largest else 1.0
+        return float(last * root * (1 + EPS) + self._rounding(metric.S, inverse, rest))
+
+    def _rounding(self, left: Array, inverse: Array, rest: float) -> float:
+        """What rounding and enclosures add, at most, to any norm of left · e^(At) · inverse, with much to spare."""
+        sizes = [float(np.linalg.norm(m)) for m in (left, np.abs(self.ends).max(axis=0), inverse)]
+        n = len(left)
+        return n * (sizes[0] * sizes[1] * (1e-14 * sizes[2] + rest) + sizes[0] * self.off * (sizes[2] + rest))
+
+
+def decay(metric: Metric, pieces: tuple[Piece, ...]) -> Decay:
+    """e^(At) over CELLS equal cells of each piece, from the first piece's begin."""
+    A, start = metric.A, pieces[0].begin
+    ends, off = [np.eye(A.nrows())], 0.0
+    A_size = np.abs(rounded(A)[0])
+    widths = [above(arb(p.duration) / CELLS) for p in pieces]
+    for p in pieces:
+        now, over = (A * arb(p.begin - start)).exp(), (A * (arb(p.duration) / CELLS)).exp()
+        for _ in range(CELLS):
+            now = now * over
+            centre, rest = rounded(now)
+            ends.append(centre)
+            off = max(off, rest)
+    values, width = np.array(ends), np.repeat(widths, CELLS)
+    spread = np.repeat([expm(A_size * w * (1 + EPS)) for w in widths], CELLS, axis=0)  # ≥ |e^(As)|, 0 ≤ s ≤ Δ
+    second = np.abs((rounded(A)[0] @ rounded(A)[0]) @ values[:-1]) + 1e-9
+    curve = (second @ spread) * (width**2 / 8)[:, None, None] * (1 + 1e-9)
+    return Decay(np.repeat(np.arange(len(pieces)), CELLS), width, values, curve, off)
+
+
+def ranges(tube: Tube, metric: Metric) -> Array:
+    """X (N, n) ≥ sup |x_j| over each of the cells of `decay`, for the motion x from the tube."""
+    found = []
+    for piece, V in zip(tube.pieces, tube.full, strict=True):
+        values, bend = _sampled(piece.linear + piece.error, CELLS)
+        found.append(np.maximum(np.abs(values[:, :-1]), np.abs(values[:, 1:])).T + bend + V * metric.reach)
+    return np.concatenate(found) * (1 + EPS)
+
+
+def inputs(system: ExactSystem, pieces: tuple[Piece, ...]) -> Array:
+    """W (N, m) ≥ sup |w| over each of the cells of `decay`."""
+    found = []
+    for p in pieces:
+        steps = [arb(p.begin) + arb(p.duration) * (arb(k) + arb(0.5, 0.5)) / CELLS for k in range(CELLS)]
+        found += [[above(w) for w in system.inputs_at(p.begin)(t)] for t in steps]
+    return np.array(found)
+
+
+def errors(tube: Tube, metric: Metric, norm: Norm) -> Array:
+    """sup N(e) over each of the cells of `decay`, from FINER cells in it."""
+    found, c = [], metric.of(norm)
+    for piece, V in zip(tube.pieces, tube.error, strict=True):
+        sizes = np.abs(norm.T) @ np.abs(piece.error)
+        values, bend = _sampled(norm.T @ piece.error, CELLS * FINER, sizes)
+        sizes = np.abs(values).max(axis=0) if norm.largest else np.sqrt((values**2).sum(axis=0))
+        curved = bend.max() if norm.largest else np.sqrt((bend**2).sum())
+        found.append(np.maximum(sizes[:-1], sizes[1:]) + curved + c * V)
+    return np.concatenate(found).reshape(-1, FINER).max(axis=1) * (1 + EPS)
+
+
+def _sampled(coefficients: Array, cells: int, sizes: Array | None = None) -> tuple[Array, Array]:
+    """Values (n, cells + 1) of polynomials at the cells' ends, and by how much (n,) they may leave the chords between.
+
+    sizes : of the coefficients before they were combined, for the rounding of the combination.
+    """
+    k = np.arange(coefficients.shape[1])
+    powers = np.linspace(0.0, 1.0, cells + 1)[None, :] ** k[:, None]
+    sizes = np.abs(coefficients) if sizes is None else sizes
+    second = (sizes * k * (k - 1)).sum(axis=1)
+    return coefficients @ powers, second / (8.0 * cells**2) + EPS * sizes.sum(axis=1)

@@ -1,0 +1,216 @@
+"""Certificates: the statement of definition 2.1 in words and numbers, with all that is needed to prove it anew.
+
+A certificate is made by `certify` and judged by `verify`, which shares no step with how the pieces and the table were
+found: it proves the claims from the certificate's own numbers, by defect and logarithmic norm.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from flint import fmpq
+
+from ..errors import InputError
+from .balls import Array, ExactSystem, NotProvedError, precision
+from .norms import Norm, proved_metric
+from .proof import Proof, prove
+from .taylor import find_pieces
+from .tube import Piece
+
+FORMAT = 1
+ROWS = 24  # of a table δ(ε)
+FIRST = 1e-3  # of the floor: what the smallest δ may add to it
+MARGIN = 1e-6  # relative, by which claims stand off what was proved
+MAX_BYTES = 200_000_000
+THEOREM = (
+    "Let psi = x_lin be the solution of the linear part x' = A x + B w(t) of x' = F(x, w(t)) with psi(0) = x0. For every "
+    "eps >= l let delta(eps) be the largest delta of the table whose eps is not above it. Then every solution x with "
+    "N(x(0) - psi(0)) < delta(eps) satisfies N(x(t) - psi(t)) < eps for all t >= 0: psi is an almost stable approximate "
+    "solution (definition 2.1, Bertolino and Baksa). N(x) = |T x|_2, or max |(T x)_i| where the norm says so; all "
+    "numbers are SI and exact as printed."
+)
+Build = Callable[[dict[str, Any]], ExactSystem]
+
+
+@dataclass(frozen=True, slots=True)
+class Claim:
+    """The floor l in a norm, and the table of δ(ε): rows (ε, δ), both rising; l is the first ε."""
+
+    norm: Norm
+    table: Array  # (rows, 2)
+
+    @property
+    def floor(self) -> float:
+        """l."""
+        return float(self.table[0, 0])
+
+    @property
+    def largest_delta(self) -> float:
+        """δ_max: beyond its ε, δ stays there."""
+        return float(self.table[-1, 1])
+
+    def delta(self, epsilon: float) -> float:
+        """δ(ε). Raises InputError for ε < l, about which nothing is claimed."""
+        if not epsilon >= self.floor:
+            raise InputError(f"epsilon = {epsilon!r}: wanted at least l = {self.floor:.6g} ({self.norm.name} norm)")
+        return float(self.table[np.searchsorted(self.table[:, 0], epsilon, side="right") - 1, 1])
+
+
+@dataclass(frozen=True, slots=True)
+class Certificate:
+    """What a certificate file holds; `model` says which system, in the words of whoever builds it."""
+
+    model: dict[str, Any]
+    x0: Array
+    S: Array
+    pieces: tuple[Piece, ...]
+    claims: tuple[Claim, ...]
+
+
+def certify(
+    model: dict[str, Any], build: Build, S: Array, norms: Callable[[Array], tuple[Norm, ...]], stop: fmpq, x0: Array
+) -> tuple[Certificate, Proof]:
+    """Find pieces to `stop` [s] and the largest table of δ(ε) in each norm; norms are made from x_lin's values (n, …).
+
+    Raises NotProvedError, with what failed, if there is no certificate.
+    """
+    with precision(2):
+        system = build(model)
+        pieces = tuple(find_pieces(system, x0.tolist(), stop))
+        proof = prove(system, proved_metric(system, S), pieces, x0.tolist())
+        x_lin = np.concatenate(
+            [p.linear @ (np.linspace(0, 1, 9) ** np.arange(p.linear.shape[1])[:, None]) for p in pieces], axis=1
+        )
+        claims = tuple(_claim(proof, norm, float(norm(x_lin).max())) for norm in norms(x_lin))
+    return Certificate(model, x0, S, pieces, claims), proof
+
+
+def _claim(proof: Proof, norm: Norm, scale: float) -> Claim:
+    """The table with the largest δ that is found, its smallest δ raising the floor by but FIRST of it."""
+    floor = float(proof.epsilon(norm, np.array([0.0]))[0])
+    if not floor < np.inf:
+        raise NotProvedError(f"no bound for all t in the {norm.name} norm")
+    first = FIRST * floor / float(proof.decay.of(norm).max())
+    top = max(16.0 * scale, 2.0 * first)
+    for _ in range(40):
+        delta = _spread(first, top)
+        epsilon = _epsilon(proof, norm, delta)
+        proved = np.count_nonzero(np.isfinite(epsilon))
+        if proved and (proved == len(delta) or delta[proved - 1] > 0.7 * top):
+            break
+        if not proved and top <= first * 1.001:
+            raise NotProvedError(f"no delta > 0 in the {norm.name} norm")
+        top = delta[proved] if proved else top / 16.0
+        first = min(first, top / 2.0)
+    epsilon, delta = np.maximum.accumulate(epsilon[:proved]) * (1.0 + MARGIN), delta[:proved] * (1.0 - MARGIN)
+    return Claim(norm, np.stack([epsilon, delta], axis=1))
+
+
+def _spread(first: float, top: float) -> Array:
+    return np.unique(np.concatenate([np.geomspace(first, top, ROWS), top * np.linspace(0.5, 1.0, 6)]))
+
+
+def _epsilon(proof: Proof, norm: Norm, delta: Array) -> Array:
+    try:
+        return proof.epsilon(norm, delta)
+    except NotProvedError:  # the box for the largest of them is too large
+        return np.full(len(delta), np.inf)
+
+
+def verify(certificate: Certificate, build: Build) -> Proof:
+    """Prove every claim of the certificate anew. Raises NotProvedError with the first that cannot be proved."""
+    with precision(2):
+        system = build(certificate.model)
+        proof = prove(system, proved_metric(system, certificate.S), certificate.pieces, certificate.x0.tolist())
+        for claim in certificate.claims:
+            epsilon = proof.epsilon(claim.norm, claim.table[:, 1])
+            for (claimed, delta), proved in zip(claim.table.tolist(), epsilon.tolist(), strict=True):
+                if not proved <= claimed:
+                    raise NotProvedError(
+                        f"{claim.norm.name} norm, delta = {delta!r}: claimed eps = {claimed!r}, proved {proved!r}"
+                    )
+    return proof
+
+
+def to_json(certificate: Certificate) -> bytes:
+    """The certificate as a file's bytes, with the hash of its content."""
+    content = {
+        "format": FORMAT,
+        "theorem": THEOREM,
+        "model": certificate.model,
+        "x0": certificate.x0.tolist(),
+        "metric": certificate.S.tolist(),
+        "claims": [
+            {
+                "norm": {"name": c.norm.name, "largest": c.norm.largest, "T": c.norm.T.tolist()},
+                "l": c.floor,
+                "delta of eps": [{"eps": e, "delta": d} for e, d in c.table.tolist()],
+            }
+            for c in certificate.claims
+        ],
+        "pieces": [
+            {"begin": str(p.begin), "end": str(p.end), "x_lin": p.linear.tolist(), "e": p.error.tolist()}
+            for p in certificate.pieces
+        ],
+    }
+    return json.dumps({"sha256": _hash(content), **content}, indent=1, allow_nan=False).encode() + b"\n"
+
+
+def _hash(content: dict[str, Any]) -> str:
+    return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
+
+
+def from_json(data: bytes, where: str) -> Certificate:
+    """Read a certificate. Raises InputError if it is not one, or if it was altered."""
+    if len(data) > MAX_BYTES:
+        raise InputError(f"{where}: wanted at most {MAX_BYTES} bytes, got {len(data)}")
+    try:
+        content = json.loads(data)
+        stated = content.pop("sha256")
+        if content["format"] != FORMAT:
+            raise InputError(f"{where}: wanted a certificate of format {FORMAT}, got {content['format']!r}")
+        if stated != _hash(content):
+            raise InputError(f"{where}: the content does not have the hash that it states: it was altered")
+        return _certificate(content)
+    except (KeyError, TypeError, ValueError, AttributeError, RecursionError, ZeroDivisionError, OverflowError) as error:
+        raise InputError(f"{where}: cannot be read as a certificate: {type(error).__name__}: {error}") from error
+
+
+def _certificate(content: dict[str, Any]) -> Certificate:
+    x0 = _numbers(content["x0"], 1)
+    n = len(x0)
+    pieces = []
+    for p in content["pieces"]:
+        linear, error = _numbers(p["x_lin"], 2), _numbers(p["e"], 2)
+        if not (linear.shape == error.shape and len(linear) == n and 2 <= linear.shape[1] <= 100):
+            raise ValueError(f"a piece has coefficients of the shapes {linear.shape} and {error.shape}")
+        begin, end = (fmpq(*map(int, str(p[key]).split("/"))) for key in ("begin", "end"))
+        if not end > begin:
+            raise ValueError(f"a piece runs from {begin} to {end}")
+        pieces.append(Piece(begin, end, linear, error))
+    claims = []
+    for c in content["claims"]:
+        table = _numbers([[row["eps"], row["delta"]] for row in c["delta of eps"]], 2)
+        if not (np.all(np.diff(table, axis=0) >= 0.0) and table[0, 1] > 0.0 and table[0, 0] == c["l"]):
+            raise ValueError("delta(eps) must rise, from l and a delta > 0 on")
+        T = _numbers(c["norm"]["T"], 2)
+        if T.shape != (n, n):
+            raise ValueError(f"a norm has the shape {T.shape}")
+        claims.append(Claim(Norm(str(c["norm"]["name"]), T, c["norm"]["largest"] is True), table))
+    S = _numbers(content["metric"], 2)
+    if S.shape != (n, n) or not pieces or not claims or not isinstance(content["model"], dict):
+        raise ValueError("wanted a metric of the states, pieces, claims and a model")
+    return Certificate(content["model"], x0, S, tuple(pieces), tuple(claims))
+
+
+def _numbers(values: Any, dimensions: int) -> Array:
+    array = np.array(values, dtype=float)
+    if array.ndim != dimensions or not all(map(math.isfinite, array.ravel().tolist())):
+        raise ValueError(f"wanted {dimensions}-dimensional finite numbers, got {str(values)[:60]}")
+    return array

@@ -1,0 +1,56 @@
+"""How far a motion that starts off the reference can get: y = e^(At) y(0) + q, the linear part exact, q by comparison.
+
+    q' = A q + R(x + y, w) − R(x, w),  q(0) = 0:     v' = −α v + ‖ΔR̄(|x|, κ_j δ + n_j v)‖_S  keeps  ‖q‖_S ≤ v
+
+for all y(0) with N(y(0)) ≤ δ. Many δ at once.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from .balls import Array
+from .majorant import Majorant
+from .norms import Metric
+
+ROUNDS = 4  # of widening v over a cell until it holds
+
+
+def perturbed(
+    metric: Metric, bound: Majorant, widths: Array, X: Array, spread: Array, v0: Array
+) -> tuple[Array, Array]:
+    """v over each cell (N, K) and at the end (K,); inf where no bound is found.
+
+    widths : of the cells (N,) [s].  X : bounds (N, n + m) of (x, w) over them.
+    spread : bounds (N, n, K) of |y − q| over the cells: of the part of y that is known without R.
+    v0     : ‖q‖_S at the begin (K,).
+    """
+    n, S, reach = len(metric.S), np.abs(metric.S), metric.reach[:, None]
+    v, largest = np.array(v0, dtype=float), np.empty((len(X), len(v0)))
+    still = np.zeros((X.shape[1] - n, len(v0)))
+
+    def forcing(cell: int, size: Array) -> Array:
+        change = bound.change(X[cell], np.concatenate([spread[cell] + reach * size, still]))
+        return np.sqrt(((S @ change) ** 2).sum(axis=0)) * (1.0 + 1e-12)
+
+    for cell, width in enumerate(widths.tolist()):
+        top, pushed = _held(lambda size, cell=cell: forcing(cell, size), v, width)
+        largest[cell] = top
+        v = (v * np.exp(-metric.alpha * width) + width * pushed) * (1.0 + 1e-12)
+        v[~np.isfinite(top)] = np.inf
+    return largest, v
+
+
+def _held(forcing: Callable[[Array], Array], v: Array, width: float) -> tuple[Array, Array]:
+    """A size that v cannot leave within the width, and the forcing there; inf where none is found."""
+    with np.errstate(invalid="ignore", over="ignore"):
+        top = v + 1.5 * width * forcing(v)
+        for _ in range(ROUNDS):
+            pushed = forcing(top)
+            fits = (v + width * pushed) * (1.0 + 1e-12) <= top
+            if fits.all():
+                return top, pushed
+            top = np.where(fits, top, 2.0 * (v + width * pushed))
+    return np.where(fits, top, np.inf), np.where(fits, pushed, np.inf)

@@ -1,0 +1,150 @@
+"""How far R(x, w) = F(x, w) − A x − B w can change: a majorant, polynomial with coefficients ≥ 0, and a bound of its tail.
+
+If |x_j| ≤ X_j and |y_j| ≤ Y_j then |R(x + y, w) − R(x, w)| ≤ R̄(X + Y, W) − R̄(X, W), row by row, where R̄ has the absolute
+values of R's coefficients. Up to ORDER these are computed with balls. The rest is bounded by evaluating the equations with
+numbers that keep only the sizes of coefficients (sin → sinh, cos → cosh), which cannot see terms cancel.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from flint import arb, arb_series
+from numpy.typing import NDArray
+
+from ..power_series import PowerSeries, cos, sin, variables
+from .balls import Array, ExactSystem, NotProvedError, above, coefficients, precision
+
+ORDER = 5
+SECANT = 0.125  # of a box's side
+CRUMB = 1e-18  # coefficients below it are lumped together
+SLACK = 1e-12  # relative; a few hundred roundings of numbers ≥ 0 make less than 1e-13
+
+
+@dataclass(frozen=True, slots=True)
+class Sizes:
+    """A power series known by its constant (a ball) and by a series in s that bounds the rest, coefficient by coefficient."""
+
+    constant: Any
+    rest: Any
+
+    def __add__(self, other: Any) -> Sizes:
+        c, r = _parts(other)
+        return Sizes(self.constant + c, self.rest + r)
+
+    def __sub__(self, other: Any) -> Sizes:
+        c, r = _parts(other)
+        return Sizes(self.constant - c, self.rest + r)
+
+    def __rsub__(self, other: Any) -> Sizes:
+        return Sizes(other - self.constant, self.rest)
+
+    def __neg__(self) -> Sizes:
+        return Sizes(-self.constant, self.rest)
+
+    def __mul__(self, other: Any) -> Sizes:
+        c, r = _parts(other)
+        rest = r * _size(self.constant) + self.rest * _size(c) + self.rest * r
+        return Sizes(self.constant * c, rest)
+
+    def __truediv__(self, other: Any) -> Sizes:
+        c, r = _parts(other)
+        inverse = 1 / arb(c)
+        bound = 1 / (1 - r * _size(inverse))  # 1/(c + r) = Σ (−r/c)ᵏ/c
+        return self * Sizes(inverse, (bound - 1) * _size(inverse))
+
+    def __rtruediv__(self, other: Any) -> Sizes:
+        return Sizes(arb(other), arb_series([0])) / self
+
+    __radd__ = __add__
+    __rmul__ = __mul__
+
+
+def _parts(x: Any) -> tuple[Any, Any]:
+    return (x.constant, x.rest) if isinstance(x, Sizes) else (arb(x), arb_series([0]))
+
+
+def _size(x: Any) -> Any:
+    return arb(x).abs_upper()
+
+
+def _sinh(x: Sizes) -> Sizes:
+    _at_zero(x)
+    return Sizes(arb(0), (x.rest.exp() - (-x.rest).exp()) / 2)
+
+
+def _cosh(x: Sizes) -> Sizes:
+    _at_zero(x)
+    return Sizes(arb(1), (x.rest.exp() + (-x.rest).exp()) / 2 - 1)
+
+
+def _at_zero(x: Sizes) -> None:
+    if not x.constant == 0:
+        raise NotProvedError("sine and cosine are bounded around 0 only")
+
+
+@dataclass(frozen=True, slots=True)
+class Majorant:
+    """R̄ of a system: monomials (M, ORDER) of y = (x, w, 1), coefficients ≥ 0 (n, M), and the tail beyond ORDER at a box."""
+
+    monomials: NDArray[np.intp]
+    coefficients: Array
+    box: Array  # (n + m,)
+    crumbs: Array  # (n,), bound on the box of all terms whose coefficients are but rounding
+    slope: Array  # (n, n + m), bound of the tail's derivatives on the box; on s · box, s ≤ 1, s^ORDER times that
+
+    def __call__(self, Y: Array) -> Array:
+        """R̄ (n, …) at sizes Y (n + m, …) ≥ 0, its tail left out; right but for SLACK."""
+        one = np.ones((1, *Y.shape[1:]))
+        return np.tensordot(self.coefficients, np.prod(np.concatenate([Y, one])[self.monomials], axis=1), axes=1)
+
+    def change(self, X: Array, Y: Array) -> Array:
+        """Bound (n, K) of |R(x + y, w) − R(x, w)|; X (n + m,) bounds (x, w), Y (n + m, K) bounds (y, 0). inf out of the box."""
+        far = X[:, None] + Y
+        s = np.max(far / self.box[:, None], axis=0)
+        tail = np.where(s <= 1.0, s**ORDER, np.inf) * (self.slope @ Y) + self.crumbs[:, None]
+        with np.errstate(invalid="ignore"):
+            return (self(far) * (1.0 + SLACK) - self(X[:, None]) * (1.0 - SLACK) + tail) * (1.0 + SLACK)
+
+
+def majorant(system: ExactSystem, box: Array) -> Majorant:
+    """R̄ of the system, its tail bounded on |y_j| ≤ box_j (n + m,), all > 0."""
+    y = variables(system.n + system.m, ORDER, arb(1))
+    rates = system.equations(y[: system.n], y[system.n :], sin, cos)
+    rows = [rate.terms if isinstance(rate, PowerSeries) else {} for rate in rates]
+    found = sorted({m for row in rows for m in row if len(m) > 1})
+    one = system.n + system.m
+    monomials = np.array([[*m, *[one] * (ORDER - len(m))] for m in found], dtype=np.intp).reshape(len(found), ORDER)
+    values = np.array([[above(row[m]) if m in row else 0.0 for m in found] for row in rows])
+    used = (values > CRUMB).any(axis=0)
+    crumbs = (values[:, ~used] * np.prod(np.append(box, 1.0)[monomials[~used]], axis=1)).sum(axis=1)
+    return Majorant(monomials[used], values[:, used], box, crumbs * (1.0 + SLACK), _tail_slope(system, box))
+
+
+def _tail_slope(system: ExactSystem, box: Array) -> Array:
+    """Derivatives of the tail at the box: it is convex in every variable, so a secant beyond the box is steeper."""
+    here, columns = _tail(system, box), []
+    for j, size in enumerate(box.tolist()):
+        beyond = box.copy()
+        beyond[j] += SECANT * size
+        rise = [b - a for a, b in zip(here, _tail(system, beyond), strict=True)]
+        columns.append([above(r) / (SECANT * size) * (1.0 + SLACK) for r in rise])
+    return np.array(columns).T
+
+
+def _tail(system: ExactSystem, box: Array) -> list[Any]:
+    """Σ of all terms of a degree > ORDER at the box: the whole minus its first terms."""
+    with precision(ORDER + 1):
+        first = _sizes(system, [arb_series([0, arb(v)]) for v in box.tolist()])
+    with precision(1):
+        whole = _sizes(system, [arb_series([arb(v)]) for v in box.tolist()])
+    return [total - terms for total, terms in zip(whole, first, strict=True)]
+
+
+def _sizes(system: ExactSystem, rests: list[Any]) -> list[Any]:
+    """Sums of the rates' bounds, constants left out."""
+    y = [Sizes(arb(0), rest) for rest in rests]
+    rates = system.equations(y[: system.n], y[system.n :], _sinh, _cosh)
+    return [sum(coefficients(rate.rest, ORDER + 1), arb(0)) if isinstance(rate, Sizes) else arb(0) for rate in rates]

@@ -1,0 +1,141 @@
+"""The proof of definition 2.1 for ψ = x_lin: everything that holds for all t ≥ 0, from given pieces.
+
+With x the motion from ψ(0) itself and y the difference of another one to it, N(x + y − x_lin) ≤ N(e) + N(y). The tube
+bounds e; y is e^(At) y(0), exactly, and a rest that `growth` bounds. What comes after the last piece is a tail.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from flint import arb, fmpq
+
+from .balls import Array, ExactSystem, NotProvedError, above, column, jacobian
+from .cells import Decay, decay, errors, inputs, ranges
+from .growth import perturbed
+from .majorant import Majorant, majorant
+from .norms import Metric, Norm
+from .tube import Piece, Tube, both, jumps, prove_tube
+
+ROOM = 1.5  # of the box on which the equations are bounded, over the largest motion
+ROOM_INPUT = 10.0  # the same for inputs, so that a quiet motion under a large input is not taken for a large one
+
+
+@dataclass(frozen=True, slots=True)
+class Repetition:
+    """The road repeats itself: x runs in the tube of the last `window` pieces for ever, period after period."""
+
+    window: Tube
+    X: Array  # bounds (N, n + m) of (x, w) over its cells
+
+
+@dataclass(frozen=True, slots=True)
+class Proof:
+    """What is proved of the reference motion x and of x_lin; `repetition` is None where the road ends flat."""
+
+    system: ExactSystem
+    metric: Metric
+    tube: Tube
+    decay: Decay
+    X: Array  # bounds (N, n + m) of (x, w) over the cells
+    repetition: Repetition | None
+
+    def epsilon(self, norm: Norm, delta: Array) -> Array:
+        """ε (K,) for δ (K,) ≥ 0: N(x(0) − ψ(0)) ≤ δ implies N(x(t) − ψ(t)) ≤ ε for all t ≥ 0; inf if not proved.
+
+        ε(0) bounds the floor l.
+        """
+        rows, kappa, c = self.decay.rows(norm), self.decay.of(norm), self.metric.of(norm)
+        bound = self.majorant(rows.max(axis=0) * delta.max())
+        spread = rows[:, :, None] * delta
+        top, end = perturbed(self.metric, bound, self.decay.width, self.X, spread, np.zeros(len(delta)))
+        on_pieces = errors(self.tube, self.metric, norm)[:, None] + kappa[:, None] * delta + c * top
+        later = self._later(norm, bound, self.decay.at_end(self.metric, norm) * delta + end)
+        return np.maximum(on_pieces.max(axis=0), later) * (1.0 + 1e-9)
+
+    def majorant(self, spread: Array) -> Majorant:
+        """R̄ on a box with room for motions that are off the reference by `spread` (n,)."""
+        n = self.system.n
+        X = self.X.max(axis=0)
+        return majorant(self.system, np.concatenate([ROOM * (X[:n] + spread), ROOM_INPUT * X[n:]]) + 1e-9)
+
+    def _later(self, norm: Norm, bound: Majorant, off: Array) -> Array:
+        """sup N(e + y) after the last piece, where ‖y‖_S begins with `off` (K,)."""
+        c = self.metric.of(norm)
+        if self.repetition is None:
+            return np.array([c * self._at_rest(u) for u in off.tolist()])
+        window, X = self.repetition.window, self.repetition.X
+        widths, off = self.decay.width[-len(X) :], off + 1e-9 * self.ends[0]  # room for roundings where nothing is off
+        top, end = perturbed(self.metric, bound, widths, X, np.zeros((len(X), self.system.n, len(off))), off)
+        most = errors(window, self.metric, norm).max() + c * top.max(axis=0)
+        return np.where(end <= off, most, np.inf)
+
+    def _at_rest(self, off: float) -> float:
+        """sup ‖e + y‖_S on the flat road, where x' = A x + R(x) and ‖R(x)‖ ≤ L ‖x‖ with L < α: x → 0, as x_lin does."""
+        x, e = self.ends
+        size = (x + off) * (1.0 + 1e-12)
+        L = self.rest_growth(size) if np.isfinite(size) else np.inf
+        if not L < self.metric.alpha:
+            return np.inf
+        return (e + off + L * size / (self.metric.alpha - L)) * (1.0 + 1e-12)
+
+    def rest_growth(self, size: float) -> float:
+        """L ≥ ‖∂F/∂x − A‖_S where ‖x‖_S ≤ size and w = 0; inf if there is no bound."""
+        box = [arb(0, n * size) for n in self.metric.reach.tolist()]
+        try:
+            return self.metric.size(jacobian(self.system, box, [arb(0)] * self.system.m) - self.metric.A)
+        except NotProvedError:
+            return np.inf
+
+    @property
+    def ends(self) -> tuple[float, float]:
+        """Bounds of ‖x‖_S and ‖e‖_S at the end of the last piece."""
+        last = self.tube.pieces[-1]
+        x = self.metric.length(column([sum(row, arb(0)) for row in both(last)]))
+        e = self.metric.length(column([sum((arb(v) for v in row), arb(0)) for row in last.error.tolist()]))
+        V_lin, V = self.tube.at_end
+        return (x + V) * (1.0 + 1e-15), (e + V + V_lin) * (1.0 + 1e-15)
+
+
+def prove(system: ExactSystem, metric: Metric, pieces: Sequence[Piece], x0: Sequence[float]) -> Proof:
+    """Prove what can be proved from these pieces. Raises NotProvedError if they do not begin at 0, or do not suffice."""
+    if pieces[0].begin != 0:
+        raise NotProvedError(f"the first piece begins at t = {float(pieces[0].begin):g} s; wanted 0")
+    if pieces[-1].end < system.pieces[-1][0]:
+        raise NotProvedError("the pieces end before the road's last corner")
+    tube = prove_tube(system, metric, pieces, (np.array(x0, dtype=float), np.zeros(system.n)))
+    X = np.hstack([ranges(tube, metric), inputs(system, tube.pieces)])
+    again = _repetition(system, metric, tube) if system.period != 0 else None
+    proof = Proof(system, metric, tube, decay(metric, tube.pieces), X, again)
+    if again is None and not proof.rest_growth(proof.ends[0]) < metric.alpha:
+        raise NotProvedError("at the end of the last piece the motion is still too large to be proved to die out")
+    return proof
+
+
+def _repetition(system: ExactSystem, metric: Metric, tube: Tube) -> Repetition:
+    """The last period's pieces, with a V that comes back no larger than it began."""
+    first = _window(system, tube.pieces)
+    pieces = tube.pieces[first:]
+    begin = pieces[0].linear[:, 0], pieces[0].error[:, 0]
+    jump = jumps(metric, (pieces[-1].linear, pieces[-1].error), pieces[0])
+    once = prove_tube(system, metric, pieces, begin, jump)
+    shrink = above(arb(sum(float(g) * float(p.duration) for g, p in zip(once.growth, pieces, strict=True))).exp())
+    if not shrink < 1.0:
+        raise NotProvedError(f"over a period differences grow by {shrink:g}; wanted < 1")
+    off = [1.1 * (j + v) / (1.0 - shrink) + t for j, v, t in zip(jump, once.at_end, tube.at_end, strict=True)]
+    window = prove_tube(system, metric, pieces, begin, (off[0], off[1]))
+    returned = [max(v, t) + j for v, t, j in zip(window.at_end, tube.at_end, jump, strict=True)]
+    if not all(v * (1.0 + 1e-15) <= o for v, o in zip(returned, off, strict=True)):
+        raise NotProvedError("the tube of one period does not come back into itself")
+    return Repetition(window, np.hstack([ranges(window, metric), inputs(system, pieces)]))
+
+
+def _window(system: ExactSystem, pieces: Sequence[Piece]) -> int:
+    """Index of the first of the pieces that make the last whole number of periods; all after the last corner."""
+    for k in range(len(pieces) - 1, -1, -1):
+        periods = (pieces[-1].end - pieces[k].begin) / system.period
+        if periods.denominator == 1 and pieces[k].begin >= system.pieces[-1][0]:
+            return k
+    raise NotProvedError("no whole number of periods at the end of the pieces")

@@ -1,0 +1,82 @@
+"""Polynomials near x_lin and near e = x − x_lin by Taylor's series: found here, proved in `tube.py`."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+from flint import arb, arb_mat, arb_series, fmpq
+
+from .balls import ExactSystem, coefficients, column, cosine, jacobian, precision, sine
+from .tube import Piece
+
+DEGREE = 22
+LAST_TERM = 1e-14  # of a polynomial, over the size of the motion: it sets the length of a piece
+LONGEST = 0.25  # s
+
+
+def find_pieces(system: ExactSystem, x0: Sequence[float], stop: fmpq) -> list[Piece]:
+    """Pieces from x(0) = x0 [exact doubles] to `stop`, none across a corner of the input or the last period's begin."""
+    zero = [arb(0)]
+    A = jacobian(system, zero * system.n, zero * system.m)
+    B = jacobian(system, zero * system.n, zero * system.m, inputs=True)
+    corners = [*(begin for begin, _ in system.pieces), stop - system.period]
+    pieces: list[Piece] = []
+    x_lin, x, t, size = column([arb(v) for v in x0]), [arb(v) for v in x0], fmpq(0), 1e-9
+    while t < stop:
+        with precision(DEGREE + 1):
+            w = system.inputs_at(t)(arb_series([arb(t), 1]))
+        linear = _linear_taylor(A, B, x_lin, w)
+        full = _taylor(lambda y, w=w: system.equations(y, w, sine, cosine), x)
+        size = max(size, *(abs(float(c[0])) for c in full))
+        left = min([c for c in corners if c > t] + [stop]) - t
+        pieces.append(_scaled(linear, full, t, t + _fitting(_length(full, size), left)))
+        ends = pieces[-1].linear.sum(axis=1), pieces[-1].error.sum(axis=1)
+        x_lin = column([arb(v) for v in ends[0].tolist()])
+        x = [arb(a) + arb(b) for a, b in zip(*(end.tolist() for end in ends), strict=True)]
+        t = pieces[-1].end
+    return pieces
+
+
+def _linear_taylor(A: arb_mat, B: arb_mat, x0: arb_mat, w: Sequence[Any]) -> list[list[Any]]:
+    inputs = arb_mat([coefficients(wi, DEGREE + 1) for wi in w])
+    terms, driven = [x0], B * inputs
+    for k in range(DEGREE):
+        slope = A * terms[-1] + column([driven[i, k] for i in range(A.nrows())])
+        terms.append((slope / (k + 1)).mid())
+    return [[term[i, 0] for term in terms] for i in range(A.nrows())]
+
+
+def _taylor(rate: Callable[[list[Any]], Sequence[Any]], x0: Sequence[Any]) -> list[list[Any]]:
+    """Coefficients of y' = rate(y), y(0) = x0, one more with each pass."""
+    terms = [[v.mid()] for v in x0]
+    for k in range(DEGREE):
+        with precision(k + 1):
+            slopes = rate([arb_series(c) for c in terms])
+            for c, slope in zip(terms, slopes, strict=True):
+                c.append((coefficients(slope, k + 1)[k] / (k + 1)).mid())
+    return terms
+
+
+def _length(terms: list[list[Any]], size: float) -> float:
+    """Time [s] over which the last two terms stay small."""
+    last = max(abs(float(c[k])) ** (1.0 / k) for c in terms for k in (DEGREE - 1, DEGREE))
+    return min(LONGEST, (LAST_TERM * size) ** (1.0 / DEGREE) / max(last, 1e-9))
+
+
+def _fitting(h: float, left: fmpq) -> fmpq:
+    """A duration ≤ h, a short fraction, that leaves no crumb before the next corner."""
+    parts = int(float(left) / h) + 1
+    return left if parts == 1 else min(left / 2, fmpq(max(int(h * 10_000), 1), 10_000))
+
+
+def _scaled(linear: list[list[Any]], full: list[list[Any]], begin: fmpq, end: fmpq) -> Piece:
+    """Coefficients in τ; e gets what x_lin's, rounded to doubles, leave."""
+    powers = [arb(end - begin) ** k for k in range(DEGREE + 1)]
+    lin = [[float((c * p).mid()) for c, p in zip(row, powers, strict=True)] for row in linear]
+    rest = [
+        [float((c * p - arb(near)).mid()) for c, p, near in zip(row, powers, nears, strict=True)]
+        for row, nears in zip(full, lin, strict=True)
+    ]
+    return Piece(begin, end, np.array(lin), np.array(rest))

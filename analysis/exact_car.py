@@ -1,0 +1,84 @@
+"""The car on its road with nothing rounded: what proofs are about. Its numbers are the decimals that their floats say."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import fields
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+from flint import arb, fmpq
+
+from fmu_src.road.profiles import RoadParameters
+from fmu_src.vehicle.linear import linearized, masses
+from fmu_src.vehicle.parameters import Car
+
+from .bertolino_baksa.balls import ExactSystem, decimal
+from .bertolino_baksa.norms import Norm, euclid, weighted_sup
+from .car import car_equations
+from .polynomials import Array
+
+NEVER = fmpq(1000000)  # s; where a wheel meets no road
+
+
+def exact_system(car: Car, road: RoadParameters, gain: Array | None = None) -> ExactSystem:
+    """x' = F(x, w): the car of `car.car_form` with its four wheels on the road from t = 0 on."""
+    exact = SimpleNamespace(**{f.name: arb(decimal(getattr(car, f.name))) for f in fields(Car)})
+    delays = _delays(road)
+    half = decimal(road.Lambda) / (2 * decimal(road.v0))  # half a wave; π/Ω
+    end = {"bump": half, "flat": fmpq(0)}.get(road.profile, NEVER)
+    corners = sorted({fmpq(0), *(t for d in delays for t in (d, d + end) if 0 < t < NEVER)})
+    shape = _shape(road, half)
+    pieces = tuple((begin, _under_wheels(shape, delays, [d <= begin < d + end for d in delays])) for begin in corners)
+    period = 2 * half if road.profile in ("sine", "fourier", "step") else fmpq(0)
+    return ExactSystem(14, 8, car_equations(exact, gain), pieces, period)
+
+
+def _delays(road: RoadParameters) -> list[fmpq]:
+    """Exact times at which the wheels fl, fr, rl, rr meet the profile."""
+    start, tau0 = decimal(road.t_start), decimal(road.tau0)
+    rear = start + (decimal(road.a) + decimal(road.b)) / decimal(road.v0)
+    met = (start, start + tau0, rear, rear + tau0)
+    return [d if on else NEVER for d, on in zip(met, road.excited, strict=True)]
+
+
+def _shape(road: RoadParameters, half: fmpq) -> Callable[[Any], tuple[Any, Any]]:
+    """Height and rate of the profile at the time since a wheel met it."""
+    if road.profile == "step":
+        return lambda s: (arb(decimal(road.A)), arb(0))
+    amplitudes = road.amplitudes if road.profile == "fourier" else (road.A,)
+    waves = [(arb(decimal(A)), nu * arb.pi() / half) for nu, A in enumerate(amplitudes, start=1) if A]
+
+    def shape(s: Any) -> tuple[Any, Any]:
+        height, rate = arb(0), arb(0)
+        for A, omega in waves:
+            height, rate = height + (s * omega).sin() * A, rate + (s * omega).cos() * (A * omega)
+        return height, rate
+
+    return shape
+
+
+def _under_wheels(shape: Callable[[Any], tuple[Any, Any]], delays: list[fmpq], met: list[bool]) -> Callable[[Any], Any]:
+    def w(t: Any) -> list[Any]:
+        pairs = [shape(t - arb(d)) if on else (arb(0), arb(0)) for d, on in zip(delays, met, strict=True)]
+        return [h for h, _ in pairs] + [dh for _, dh in pairs]
+
+    return w
+
+
+def energy_norm(car: Car) -> Norm:
+    """√(½ q̇ᵀ M q̇ + ½ qᵀ K q) [√J], the linear car's energy; its factors rounded to doubles, which then define it."""
+    M, linear = np.array(masses(car)), linearized(car)
+    K = -np.array(linear.A)[7:, :7] * M[:, None]
+    T = np.zeros((14, 14))
+    T[:7, :7] = np.linalg.cholesky((K + K.T) / 4.0).T
+    T[7:, 7:] = np.diag(np.sqrt(M / 2.0))
+    return Norm("energy", T)
+
+
+def norms(car: Car, x_lin: Array) -> tuple[Norm, ...]:
+    """The norms of a statement: energy [√J]; each state over its largest value in x_lin (14, …) [1]; Euclid [SI]."""
+    largest = np.abs(x_lin).max(axis=1)
+    weights = np.maximum(largest, 1e-6 * largest.max() + 1e-12)
+    return energy_norm(car), weighted_sup(weights), euclid(14)
