@@ -37,7 +37,7 @@ def system_files(structure: bytes, scenarios: Sets, titles: Mapping[str, str]) -
     every component that has it.  titles : a line on each scenario.
     """
     shipped, complete = etree.fromstring(structure), etree.fromstring(structure)
-    files = {}
+    files: dict[str, bytes] = {}
     for component in shipped.iterfind(".//ssd:Component", SPACES):
         name, model = component.get("name", ""), _MODELS[PurePosixPath(component.get("source", "")).stem]
         sets = {DEFAULT: defaults(model), START: start_values(model)}
@@ -80,8 +80,8 @@ def _path(each: str, component: str) -> str:
 
 def _parameter_set(name: str, values: Mapping[str, Value], title: str) -> bytes:
     """An .ssv file; every number as repr, with its unit, which is defined at the end."""
-    described = {"description": title} if title else {}
-    root = etree.Element(f"{{{SSV}}}ParameterSet", nsmap={"ssv": SSV, "ssc": SSC}, version="1.0", name=name, **described)
+    about = {"version": "1.0", "name": name, **({"description": title} if title else {})}
+    root = etree.Element(f"{{{SSV}}}ParameterSet", about, nsmap={"ssv": SSV, "ssc": SSC})
     parameters = etree.SubElement(root, f"{{{SSV}}}Parameters")
     for variable, value in values.items():
         parameter = etree.SubElement(parameters, f"{{{SSV}}}Parameter", name=variable)
