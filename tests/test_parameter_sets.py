@@ -16,7 +16,7 @@ from small_master import deviation
 
 from analysis.scenario import built_in_scenarios, read_scenario
 from analysis.wiring import read_wiring
-from build import MODELS
+from build import MODELS, system_contents
 from fmu_src.quantities import STATES, UNITS
 
 SCHEMAS = Path(fmpy.__file__).parent / "ssp" / "schema"  # those of SSP 1.0
@@ -52,6 +52,10 @@ def test_every_file_of_the_ssp_is_valid(contents: dict[str, bytes]) -> None:
     assert set(contents) == {*found, *(f"resources/{model}.fmu" for model in MODELS)}
     for name, schema in found.items():
         assert schema.validate(etree.fromstring(contents[name])), (name, schema.error_log)
+
+
+def test_the_same_sources_give_the_same_files(contents: dict[str, bytes]) -> None:
+    assert system_contents() == {name: data for name, data in contents.items() if not name.endswith(".fmu")}
 
 
 def test_every_number_of_a_set_has_a_unit_that_the_set_defines_as_the_table_does(contents: dict[str, bytes]) -> None:
