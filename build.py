@@ -107,7 +107,8 @@ def _install(extras: list[str]) -> None:
 # ---------------------------------------------------------------------------------------------------- FMUs
 def build() -> None:
     """Build the FMUs, their cross-check sets, the .ssp that wires them and the container, unless up to date."""
-    fresh = _content_hash([PACKAGE, *(ROOT / name for name in ("build.py", "constraints.txt", "LICENSE"))])
+    beside = ("build.py", "constraints.txt", "LICENSE", "analysis/scenario.py")
+    fresh = _content_hash([PACKAGE, *(ROOT / name for name in beside)])
     stamp = DIST / "sources.sha256"
     made = [DIST / "VehicleOnRoad.ssp", DIST / "VehicleOnRoad.fmu", *(DIST / f"{model}.fmu" for model in MODELS)]
     if stamp.is_file() and stamp.read_text() == fresh and all(path.is_file() for path in made):
@@ -122,11 +123,21 @@ def build() -> None:
     for model in MODELS:
         build_fmu(model, PACKAGE, DIST / f"{model}.fmu")
         write_cross_check(DIST / f"{model}.fmu", DIST / "cross-check")
-    ssp = {"SystemStructure.ssd": SYSTEM / "SystemStructure.ssd"}
-    ssp |= {f"resources/{model}.fmu": DIST / f"{model}.fmu" for model in MODELS}
-    write_archive(DIST / "VehicleOnRoad.ssp", {name: path.read_bytes() for name, path in ssp.items()})
+    fmus = {f"resources/{model}.fmu": (DIST / f"{model}.fmu").read_bytes() for model in MODELS}
+    write_archive(DIST / "VehicleOnRoad.ssp", {**system_contents(), **fmus})
     write_archive(DIST / "VehicleOnRoad.fmu", container_contents(DIST / "VehicleOnRoad.ssp"))
     stamp.write_text(fresh)
+
+
+def system_contents() -> dict[str, bytes]:
+    """What the .ssp holds beside the FMUs: structures, and a parameter set for the default and for each scenario."""
+    from analysis.scenario import built_in_scenarios, read_scenario
+    from fmu_src.export.system import system_files
+
+    scenarios = {name: read_scenario(name) for name in built_in_scenarios()}
+    values = {name: {**s.parameters, **s.start} for name, s in scenarios.items()}
+    titles = {name: s.title for name, s in scenarios.items()}
+    return system_files((SYSTEM / "SystemStructure.ssd").read_bytes(), values, titles)
 
 
 def build_fmu(model: str, package: Path, target: Path) -> None:

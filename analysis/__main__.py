@@ -31,6 +31,11 @@ def main(arguments: list[str] | None = None) -> int:
     except OSError as error:
         print(f"error: {error}", file=sys.stderr)
         return 2
+    except MemoryError as error:
+        print(
+            f"error: not enough memory: {error or 'none left'}; wanted a longer step or a shorter time", file=sys.stderr
+        )
+        return 2
     except KeyboardInterrupt:
         print("interrupted; nothing was written", file=sys.stderr)
         return 128 + signal.SIGINT

@@ -5,6 +5,7 @@ from __future__ import annotations
 import ctypes
 import hashlib
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, NoReturn
 
@@ -13,6 +14,7 @@ from fmpy.fmi2 import FMU2Slave, defaultCallbacks, fmi2CallbackFunctions, fmi2Ca
 from fmpy.logging import addLoggerProxy
 
 from .errors import CosimError, InputError
+from .units import BASE, Unit, unit
 
 WARNING = 1  # highest fmi2Status that lets a simulation go on
 STATUS = ("ok", "warning", "discard", "error", "fatal", "pending")
@@ -46,7 +48,7 @@ def callbacks(environment: int) -> Any:
 
 
 class Component:
-    """An instantiated FMU. `variables`: by name, as in its model description."""
+    """An instantiated FMU. `variables`: by name, as in its model description; `units`: of those that have one."""
 
     def __init__(self, name: str, archive: Path, folder: Path) -> None:
         self.name, self.log = name, list[str]()
@@ -54,8 +56,9 @@ class Component:
             self.sha256 = hashlib.sha256(archive.read_bytes()).hexdigest()
             extract(archive, folder)
             description = read_model_description(folder, validate=False)
+            self.units = _units(description)
         except Exception as error:  # fmpy raises bare Exceptions; zipfile and the system their own
-            raise InputError(f"{name}: {archive.name} cannot be unpacked: {error}") from error
+            raise InputError(f"{name}: {archive.name} cannot be read as an FMU: {error}") from error
         if description.coSimulation is None:
             raise InputError(f"{name}: {archive.name} has no co-simulation interface")
         self.guid = description.guid
@@ -91,20 +94,24 @@ class Component:
         return (ctypes.c_uint * len(names))(*(self.variables[name].valueReference for name in names))
 
     def set_parameters(self, values: dict[str, Value]) -> None:
-        """Set those of the values whose names this FMU has as parameters or start values, by their types."""
+        """Set those of the values (SI) whose names this FMU has as parameters or start values, by their types."""
         setters = {"Real": self.fmu.setReal, "Boolean": self.fmu.setBoolean, "String": self.fmu.setString}
         for name, value in values.items():
             if name in self.variables and self.variables[name].causality in ("parameter", "output"):
                 variable = self.variables[name]
+                if name in self.units:
+                    value = self.units[name].from_si(float(value))
                 self.call(setters[variable.type], [variable.valueReference], [value])
 
     def parameters(self) -> dict[str, Value]:
-        """Present values of all parameters."""
+        """Present values of all parameters, SI units."""
         getters = {"Real": self.fmu.getReal, "Boolean": self.fmu.getBoolean, "String": self.fmu.getString}
         found: dict[str, Value] = {}
         for v in self.variables.values():
             if v.causality == "parameter":
                 (value,) = self.call(getters[v.type], [v.valueReference])
+                if v.name in self.units:
+                    value = self.units[v.name].to_si(value)
                 found[v.name] = (
                     value.decode() if isinstance(value, bytes) else bool(value) if v.type == "Boolean" else value
                 )
@@ -134,6 +141,21 @@ class Component:
             self.fmu.terminate()
         self.fmu.freeInstance()
         del logs[id(self.log)]
+
+
+def _units(description: Any) -> dict[str, Unit]:
+    """The units of those variables that have one; a difference (relativeQuantity) knows no offset."""
+    bases = {u.name: u.baseUnit for u in description.unitDefinitions}
+    found = {}
+    for v in description.modelVariables:
+        name = v.unit or (v.declaredType.unit if v.declaredType else None)
+        if v.type == "Real" and name:
+            base = bases.get(name)
+            attributes = None if base is None else {key: getattr(base, key) for key in (*BASE, "factor", "offset")}
+            found[v.name] = unit(name, attributes)
+            if v.relativeQuantity:
+                found[v.name] = replace(found[v.name], offset=0.0)
+    return found
 
 
 def _address(fmu: Any, function: str) -> int:

@@ -28,7 +28,8 @@ from .errors import InputError
 from .layout import lay_out
 from .scenario import Scenario
 from .trajectory import Array, Run, Trajectory
-from .wiring import Port, Wiring, read_wiring
+from .units import SAME, Conversion
+from .wiring import Port, Wiring, conversions, read_wiring
 
 DEFAULT_SYSTEM = Path(__file__).resolve().parents[1] / "dist" / "VehicleOnRoad.ssp"
 CHUNK = 64  # steps between two looks at the progress bar and at Ctrl-C
@@ -36,20 +37,22 @@ DOUBLE = 8  # bytes
 
 
 def simulate(scenario: Scenario, system: Path = DEFAULT_SYSTEM, *, progress: bool = False) -> Run:
-    """Co-simulate a scenario on the system in an .ssp file; everything that was unpacked is removed afterwards.
+    """Co-simulate a scenario on a system: an .ssp file, or a folder that one was unpacked into.
 
-    Raises InputError for a system or a variable that is not there, CosimError, with the FMU's own words, where an FMU
-    refuses. A progress bar appears on a terminal if asked for.
+    Parameters and start values are the scenario's, whatever sets the system binds. What was unpacked here is removed
+    afterwards. Raises InputError for a system or a variable that is not there and for a system that cannot be wired,
+    CosimError, with the FMU's own words, where an FMU refuses. A progress bar appears on a terminal if asked for.
     """
-    if not system.is_file():
+    if not system.exists():
         raise InputError(f"{system}: no such file; build it with: python3 build.py build")
     with contextlib.ExitStack() as stack:
         folder = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="cosimulation_")))
         caught = stack.enter_context(_deferred_signals())
         wiring, components = _load(system, folder, stack)
+        table = _Table(components, wiring, scenario)
         _initialize(components, scenario)
         parameters = {name: c.parameters() for name, c in components.items()}
-        trajectory = _Table(components, wiring, scenario).fill(caught, progress)
+        trajectory = table.fill(caught, progress)
     record = {
         "format": 1,
         "scenario": scenario.as_json(),
@@ -68,19 +71,25 @@ def simulate(scenario: Scenario, system: Path = DEFAULT_SYSTEM, *, progress: boo
 
 
 def _load(system: Path, folder: Path, stack: contextlib.ExitStack) -> tuple[Wiring, dict[str, Component]]:
-    """Unpack the system into the folder and instantiate its components; the stack frees them."""
-    try:
-        fmpy.extract(system, folder)
-    except Exception as error:  # fmpy raises bare Exceptions; zipfile its own
-        raise InputError(f"{system}: cannot be unpacked: {error}") from error
-    wiring = read_wiring(folder / "SystemStructure.ssd")
+    """Instantiate the components of the system, unpacked into the folder; the stack frees them."""
+    place = system
+    if not system.is_dir():
+        place = folder / "system"
+        try:
+            fmpy.extract(system, place)
+        except Exception as error:  # fmpy raises bare Exceptions; zipfile its own
+            raise InputError(f"{system}: cannot be unpacked: {error}") from error
+    wiring = read_wiring(place / "SystemStructure.ssd", system / "SystemStructure.ssd")
+    outside = [s for s in wiring.sources.values() if not (place / s).resolve().is_relative_to(place.resolve())]
+    if outside:
+        raise InputError(f"{system}: wanted FMUs inside it, got links that lead elsewhere: {', '.join(outside)}")
     components = {}
     for name, source in wiring.sources.items():
-        component = Component(name, folder / source, folder / "unpacked" / name)
+        component = Component(name, place / source, folder / "fmus" / name)
         stack.callback(component.free)
         components[name] = component
     ports = {*wiring.feeds, *wiring.feeds.values()}
-    lacking = [f"{p.component}.{p.variable}" for p in ports if not components[p.component].has(p.variable)]
+    lacking = [str(p) for p in ports if not components[p.component].has(p.variable)]
     if lacking:
         raise InputError(f"{system}: its FMUs lack these of its connectors: {', '.join(sorted(lacking))}")
     return wiring, components
@@ -106,6 +115,7 @@ class _Stage:
     input_address: int
     output_address: int
     gathered: tuple[Array, Array] | None  # where the inputs are no stretch: a buffer for them, and their positions
+    converted: tuple[Array, Array] | None  # where they come in other units: factors and offsets; then gathered, too
 
 
 class _Table:
@@ -117,6 +127,10 @@ class _Table:
         self.recorded = self._recorded(scenario.record)
         self.inputs = {name: [p.variable for p in wiring.feeds if p.component == name] for name in components}
         feeds = {name: [wiring.feeds[Port(name, v)] for v in inputs] for name, inputs in self.inputs.items()}
+        fmus = {Port(name, v): unit for name, c in components.items() for v, unit in c.units.items()}
+        self.units = {**wiring.units, **fmus}
+        found = conversions(wiring, fmus)
+        self.converted = {name: _arrays([found[Port(name, v)] for v in inputs]) for name, inputs in self.inputs.items()}
         self.layout = lay_out(self.outputs, feeds, list(components), scenario.coupling)
         span = scenario.stop_time - scenario.start_time
         self.whole = round(span / scenario.step)  # steps of full length
@@ -163,9 +177,17 @@ class _Table:
                 _advance(stages, range(self.whole, self.whole + 1), s.start_time, s.step, self.rest, self.rows)
         time = s.start_time + s.step * np.arange(len(self.rows), dtype=np.float64)
         time[-1] = s.stop_time
-        columns = [self.layout.columns[port] for port in self.recorded]
         names = tuple(port.variable for port in self.recorded)
-        return Trajectory(time=time, names=names, values=self.rows[:, columns])
+        return Trajectory(time=time, names=names, values=self._recorded_values())
+
+    def _recorded_values(self) -> Array:
+        """The recorded columns in SI units."""
+        values = self.rows[:, [self.layout.columns[port] for port in self.recorded]]
+        for column, port in enumerate(self.recorded):
+            unit = self.units.get(port)
+            if unit and (unit.factor, unit.offset) != (1.0, 0.0):
+                values[:, column] = unit.factor * values[:, column] + unit.offset
+        return values
 
     def _first_row(self) -> None:
         """Values at the start: twice around, so that the controller's forces reach the car's accelerations."""
@@ -173,7 +195,10 @@ class _Table:
             for name, c in self.components.items():
                 if self.inputs[name]:
                     sources = [position % self.layout.width for position in self.layout.inputs[name]]
-                    c.call(c.fmu.setReal, list(c.references(self.inputs[name])), self.rows[0, sources].tolist())
+                    values = self.rows[0, sources]
+                    if converted := self.converted[name]:
+                        values = values * converted[0] + converted[1]
+                    c.call(c.fmu.setReal, list(c.references(self.inputs[name])), values.tolist())
                 self._read_first(name, c)
         for name, c in self.components.items():
             c.call(c.fmu.exitInitializationMode)
@@ -187,8 +212,8 @@ class _Table:
         c, layout = self.components[name], self.layout
         positions = layout.inputs[name]
         new_row = self.rows.ctypes.data + layout.width * DOUBLE
-        gathered = None
-        if positions and not layout.stretch(name):
+        gathered, converted = None, self.converted[name]
+        if positions and (converted or not layout.stretch(name)):
             gathered = np.empty(len(positions)), np.array(positions) + layout.width
         return _Stage(
             component=c,
@@ -197,7 +222,15 @@ class _Table:
             input_address=new_row + positions[0] * DOUBLE if positions else 0,
             output_address=new_row + layout.columns[Port(name, self.outputs[name][0])] * DOUBLE,
             gathered=gathered,
+            converted=converted,
         )
+
+
+def _arrays(found: list[Conversion]) -> tuple[Array, Array] | None:
+    """Factors and offsets; None if nothing is to be converted."""
+    if all(each == SAME for each in found):
+        return None
+    return np.array([each.factor for each in found]), np.array([each.offset for each in found])
 
 
 def _advance(stages: list[_Stage], steps: range, start: float, step: float, length: float, rows: Array) -> None:
@@ -213,6 +246,9 @@ def _advance(stages: list[_Stage], steps: range, start: float, step: float, leng
                 if stage.gathered is not None:
                     buffer, positions = stage.gathered
                     np.take(flat, positions + k * width, out=buffer)
+                    if stage.converted is not None:
+                        np.multiply(buffer, stage.converted[0], out=buffer)
+                        np.add(buffer, stage.converted[1], out=buffer)
                     address = buffer.ctypes.data
                 if (status := c.set_real(pointer, stage.inputs, n_in, address)) > WARNING:
                     c.fail("setting inputs", t, status)

@@ -1,23 +1,33 @@
-"""The wiring of a system, read from its SystemStructure.ssd (SSP 1.0): which output feeds which input."""
+"""The wiring of a system, read from its SystemStructure.ssd (SSP 1.0): what feeds which input, and in which units."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path, PurePosixPath
 
 from lxml import etree
 
 from .errors import InputError
+from .units import SAME, Conversion, Unit, conversion, unit
 
-_NS = {"ssd": "http://ssp-standard.org/SSP1/SystemStructureDescription"}
+_NS = {
+    "ssd": "http://ssp-standard.org/SSP1/SystemStructureDescription",
+    "ssc": "http://ssp-standard.org/SSP1/SystemStructureCommon",
+}
+_TRANSFORMATIONS = ("Linear", "BooleanMapping", "IntegerMapping", "EnumerationMapping")
 
 
 @dataclass(frozen=True, slots=True)
 class Port:
-    """One variable of one component."""
+    """One variable of one component, or ("") of the system itself."""
 
     component: str
     variable: str
+
+    def __str__(self) -> str:
+        return f"{self.component}.{self.variable}" if self.component else f"the system's own {self.variable}"
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,41 +36,122 @@ class Wiring:
 
     sources: dict[str, str]  # component -> path of its FMU inside the archive
     feeds: dict[Port, Port]  # input -> the output that feeds it; in the order of the connectors, which is the FMU's
+    places: dict[Port, str]  # input -> file and line of its connection
+    units: dict[Port, Unit]  # of those connectors that say one
+    unconverted: frozenset[Port]  # inputs whose connection says suppressUnitConversion
 
 
-def read_wiring(path: Path) -> Wiring:
-    """Read a SystemStructure.ssd. Raises InputError with every fault, each with its line."""
+def read_wiring(path: Path, shown: Path | None = None) -> Wiring:
+    """Read a SystemStructure.ssd, which faults call `shown`. Raises InputError with every fault, each with its line.
+
+    Outputs of the system itself may be connected, and are left alone; an input of its own has no source here.
+    """
+    shown = shown or path
     parser = etree.XMLParser(resolve_entities=False, no_network=True, load_dtd=False, huge_tree=False)
     try:
         root = etree.parse(str(path), parser).getroot()
     except (OSError, etree.XMLSyntaxError) as error:
-        raise InputError(f"{path}: cannot be read as a system structure: {error}") from error
+        raise InputError(f"{shown}: cannot be read as a system structure: {error}") from error
     components = list(root.iterfind(".//ssd:Component", _NS))
     connectors = {
-        Port(component.get("name", ""), connector.get("name", "")): connector
-        for component in components
-        for connector in component.iterfind("ssd:Connectors/ssd:Connector", _NS)
+        Port(name, connector.get("name", "")): connector
+        for name, element in [*((c.get("name", ""), c) for c in components), ("", root.find("ssd:System", _NS))]
+        if element is not None
+        for connector in element.iterfind("ssd:Connectors/ssd:Connector", _NS)
     }
     kinds = {port: connector.get("kind", "") for port, connector in connectors.items()}
-    faults = [] if components else [f"{path}: wanted at least one component, got none"]
-    faults += [f"{path}:{c.sourceline}: {fault}" for c in components for fault in _component_faults(c, components)]
-    feeds: dict[Port, Port] = {}
-    for connection in root.iterfind(".//ssd:Connection", _NS):
-        start = Port(connection.get("startElement", ""), connection.get("startConnector", ""))
-        end = Port(connection.get("endElement", ""), connection.get("endConnector", ""))
-        found = [_port_fault(start, "output", kinds), _port_fault(end, "input", kinds)]
-        found.append(f"{end.component}.{end.variable} has two sources" if end in feeds else None)
-        faults += [f"{path}:{connection.sourceline}: {fault}" for fault in found if fault]
-        feeds.setdefault(end, start)
-    inputs = [port for port, kind in kinds.items() if kind == "input"]
+    faults = [] if components else [f"{shown}: wanted at least one component, got none"]
+    faults += [f"{shown}:{c.sourceline}: {fault}" for c in components for fault in _component_faults(c, components)]
+    units = _units(root, connectors, shown, faults)
+    connections = _connections(root, kinds, shown, faults)
+    inputs = [port for port, kind in kinds.items() if kind == "input" and port.component]
     faults += [
-        f"{path}:{connectors[port].sourceline}: the input {port.component}.{port.variable} has no source"
+        f"{shown}:{connectors[port].sourceline}: the input {port} has no source"
         for port in inputs
-        if port not in feeds
+        if port not in connections
     ]
     if faults:
         raise InputError("\n".join(faults))
-    return Wiring({c.get("name", ""): c.get("source", "") for c in components}, {port: feeds[port] for port in inputs})
+    return Wiring(
+        sources={c.get("name", ""): c.get("source", "") for c in components},
+        feeds={port: _end(connections[port], "start") for port in inputs},
+        places={port: f"{shown}:{connections[port].sourceline}" for port in inputs},
+        units=units,
+        unconverted=frozenset(p for p in inputs if connections[p].get("suppressUnitConversion") in ("true", "1")),
+    )
+
+
+def conversions(wiring: Wiring, fmus: Mapping[Port, Unit]) -> dict[Port, Conversion]:
+    """For each input what takes its source's numbers to its own; `fmus`: units of the FMUs' variables that have one.
+
+    A connector in another unit than its FMU's variable changes nothing as long as it can be converted; it stands in
+    where the FMU says none, and where neither does numbers pass as they are. Raises InputError with every fault.
+    """
+    faults: list[str] = []
+    found = {}
+    for end, start in wiring.feeds.items():
+        own, drawn = "in its FMU", "at its connector"
+        said = [(start, own, fmus), (start, drawn, wiring.units), (end, drawn, wiring.units), (end, own, fmus)]
+        chain = [(f"{port} {where}", us[port]) for port, where, us in said if port in us]
+        chain = [] if end in wiring.unconverted else chain
+        faults += [
+            f"{wiring.places[end]}: wanted {to} in a unit that can be made of {a.name!r} (of {of}), got {b.name!r}"
+            for (of, a), (to, b) in pairwise(chain)
+            if conversion(a, b) is None
+        ]
+        found[end] = (conversion(chain[0][1], chain[-1][1]) if chain else None) or SAME
+    if faults:
+        raise InputError("\n".join(faults))
+    return found
+
+
+def _units(
+    root: etree._Element, connectors: dict[Port, etree._Element], shown: Path, faults: list[str]
+) -> dict[Port, Unit]:
+    """The units of the connectors, from the definitions in the file; what is wrong with them joins the faults."""
+    defined = {}
+    for definition in root.iterfind("ssd:Units/ssc:Unit", _NS):
+        name, base = definition.get("name", ""), definition.find("ssc:BaseUnit", _NS)
+        try:
+            defined[name] = unit(name, None if base is None else {str(k): str(v) for k, v in base.attrib.items()})
+        except ValueError as error:
+            faults.append(f"{shown}:{definition.sourceline}: {error}")
+            defined[name] = Unit(name)
+    found = {}
+    for port, connector in connectors.items():
+        real = connector.find("ssc:Real", _NS)
+        said = real.get("unit", "") if real is not None else ""
+        if said:
+            if said not in defined:
+                known = ", ".join(defined) or "none"
+                faults.append(
+                    f"{shown}:{connector.sourceline}: {port}: wanted a unit of the file's Units ({known}), got {said!r}"
+                )
+            found[port] = defined.get(said, Unit(said))
+    return found
+
+
+def _connections(
+    root: etree._Element, kinds: dict[Port, str], shown: Path, faults: list[str]
+) -> dict[Port, etree._Element]:
+    """The connections by where they end; what is wrong with them joins the faults."""
+    connections: dict[Port, etree._Element] = {}
+    for connection in root.iterfind(".//ssd:Connection", _NS):
+        start, end = _end(connection, "start"), _end(connection, "end")
+        found = [_source_fault(start, kinds), _port_fault(end, "input" if end.component else "output", kinds)]
+        found.append(f"{end} has two sources" if end in connections else None)
+        found.append(f"{end}: wanted a connection without a transformation" if _transforms(connection) else None)
+        faults += [f"{shown}:{connection.sourceline}: {fault}" for fault in found if fault]
+        connections.setdefault(end, connection)
+    return connections
+
+
+def _end(connection: etree._Element, which: str) -> Port:
+    return Port(connection.get(f"{which}Element", ""), connection.get(f"{which}Connector", ""))
+
+
+def _transforms(connection: etree._Element) -> bool:
+    return any(connection.find(f"ssc:{kind}Transformation", _NS) is not None for kind in _TRANSFORMATIONS)
 
 
 def _component_faults(component: etree._Element, components: list[etree._Element]) -> list[str]:
@@ -79,8 +170,13 @@ def _component_faults(component: etree._Element, components: list[etree._Element
     ]
 
 
+def _source_fault(port: Port, kinds: dict[Port, str]) -> str | None:
+    if not port.component and kinds.get(port) == "input":
+        return f"{port} has no source: wanted a system that needs no inputs"
+    return _port_fault(port, "output", kinds)
+
+
 def _port_fault(port: Port, wanted: str, kinds: dict[Port, str]) -> str | None:
-    where = f"{port.component}.{port.variable}"
     if port in kinds:
-        return None if kinds[port] == wanted else f"{where} is not an {wanted} but has the kind {kinds[port]!r}"
-    return f"{where} is not an {wanted}: there is no such component, or it has no such connector"
+        return None if kinds[port] == wanted else f"{port} is not an {wanted} but has the kind {kinds[port]!r}"
+    return f"{port} is not an {wanted}: there is no such component, or it has no such connector"

@@ -39,3 +39,16 @@ def dist() -> Path:
     folder = ROOT / "dist"
     assert (folder / "VehicleOnRoad.ssp").is_file(), "build the FMUs first: python3 build.py build"
     return folder
+
+
+@pytest.fixture(scope="session")
+def system(dist: Path) -> Path:
+    return dist / "VehicleOnRoad.ssp"
+
+
+@pytest.fixture
+def foreign(tmp_path: Path) -> Callable[..., Any]:
+    """Runs a script of tests/foreign and reads its recording back."""
+    from foreign_runs import runner
+
+    return runner(tmp_path)

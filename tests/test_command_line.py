@@ -143,8 +143,11 @@ def test_an_honest_run_passes_the_check_and_gets_its_findings(work: Path) -> Non
     assert below(work / "run") == {"trajectory.csv", "run.json", "findings.json"}
 
 
-@pytest.mark.parametrize("state", ["body.heave", "axle_r.roll"])
-def test_a_run_that_was_tampered_with_fails_the_check(work: Path, state: str) -> None:
+@pytest.mark.parametrize(("state", "step"), [("body.heave", 1e-3), ("axle_r.roll", float("inf"))])
+def test_a_run_that_was_tampered_with_fails_the_check_whatever_step_its_record_says(
+    work: Path, state: str, step: float
+) -> None:
+    change_record(work / "run", lambda record: record["scenario"].update(step=step))
     change_column(work / "run", state, lambda row, value: value + 2e-4 * (row > 120))
     done = command(work, "check", "run")
     assert done.returncode == 1
@@ -190,7 +193,6 @@ BAD: dict[str, tuple[Callable[[Path], object], str, str]] = {
     "text in table": (write("run/trajectory.csv", "time,m\n0,1\n1,x\n"), "check run", "row 3, column 'm': .* got 'x'"),
     "states missing": (write("run/trajectory.csv", "time,m\n0,1\n1,1\n"), "check run", "the run cannot be checked"),
     "no record": (write("run/run.json", "{"), "check run", r"run/run\.json: cannot be read"),
-    "no step": (lambda w: change_record(w / "run", lambda r: r["scenario"].pop("step")), "check run", "wanted .*step"),
 }  # fmt: skip
 
 
@@ -235,6 +237,28 @@ def test_a_folder_that_is_no_run_is_refused_before_the_simulation_and_left_alone
     assert time.monotonic() - begun < 10.0
     assert below(work / "thesis") == {"chapter.tex"}
     assert (work / "thesis" / "chapter.tex").read_text() == "years of work"
+
+
+@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="memory is limited here as Linux does it")
+def test_a_run_that_does_not_fit_into_memory_ends_in_one_line(work: Path) -> None:
+    (work / "vast.toml").write_text("[simulation]\nstop_time = 9999.0\n")
+    limited = "import resource, runpy, sys; resource.setrlimit(resource.RLIMIT_AS, (3_000_000_000, -1)); "
+    done = subprocess.run(
+        [
+            sys.executable,
+            "-c",
+            limited + "runpy.run_module('analysis', run_name='__main__')",
+            *"simulate vast.toml -o out".split(),
+        ],
+        cwd=work,
+        env={**os.environ, "PYTHONPATH": str(ROOT), "OPENBLAS_NUM_THREADS": "1"},
+        capture_output=True,
+        text=True,
+        timeout=60,
+    )
+    assert (done.returncode, done.stdout) == (2, "")
+    assert re.fullmatch(r"error: not enough memory: Unable to allocate .*; wanted a longer step .*\n", done.stderr)
+    assert not (work / "out").exists()
 
 
 # ------------------------------------------------------------------ signals

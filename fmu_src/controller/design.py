@@ -81,13 +81,17 @@ class Design:
 def design(car: HalfCar, *, infinite: bool, span: float | None) -> Design:
     """Solve the Riccati equations of this half car: algebraic if `infinite`, backward over `span` [s] if given.
 
-    Raises ImportError where numpy, scipy or (infinite horizon) control are missing.
+    Raises ImportError where numpy, scipy or (infinite horizon) control are missing, ParameterError, which names all
+    that is not at its default, where there is no design.
     """
     import numpy as np
 
     A, B, Q, R = (np.array(M) for M in (car.A, car.B, car.Q, car.R))
-    forever = tuple(infinite_horizon(A, B, Q, R)[1].ravel().tolist()) if infinite else None
-    table = None if span is None else _gain_table(A, B, Q, R, span)
+    try:
+        forever = tuple(infinite_horizon(A, B, Q, R)[1].ravel().tolist()) if infinite else None
+        table = None if span is None else _gain_table(A, B, Q, R, span)
+    except (ParameterError, np.linalg.LinAlgError) as error:
+        raise ParameterError([f"{', '.join(car.changes) or 'the default half car'}: {error}"]) from error
     return Design(car, forever, table)
 
 
@@ -107,7 +111,7 @@ def _gain_table(A: Array, B: Array, Q: Array, R: Array, span: float) -> GainTabl
     if entries > MOST_ENTRIES:
         raise ParameterError(
             [
-                f"lambda, H1, T: {span:g} s of control with poles up to {np.abs(poles).max():.3g}/s: wanted a slower "
+                f"{span:g} s of control with poles up to {np.abs(poles).max():.3g}/s: wanted a slower "
                 f"or shorter control, whose gain table has at most {MOST_ENTRIES} entries"
             ]
         )

@@ -44,6 +44,13 @@ class HalfCar:
         refuse(faults)
 
     @property
+    def changes(self) -> list[str]:
+        """What is not at its default, in words."""
+        table = {f.name: PARAMETERS["lambda" if f.name == "lam" else f.name] for f in fields(self)}
+        values = {name: getattr(self, name) for name in table}
+        return [f"{q.name} = {values[name]!r} {q.unit}" for name, q in table.items() if values[name] != q.start]
+
+    @property
     def A(self) -> Matrix:
         """A of (4.1). Row 4: the print has −(a c1 + b c2)/J, −(a² c1 − b² c2)/J; energy asks for the other signs."""
         m, J, a, b = self.m, self.Jy, self.a, self.b

@@ -43,9 +43,9 @@ def finite_horizon(A: Array, B: Array, Q: Array, R: Array, to_go: Array) -> Arra
                 atol=1e-16 * scale,
             )
     except FloatingPointError as error:
-        raise ParameterError([f"lambda, H1: the Riccati equation leaves the finite numbers: {error}"]) from error
+        raise ParameterError([f"the Riccati equation leaves the finite numbers: {error}"]) from error
     if not solution.success:
-        raise ParameterError([f"lambda, H1, T: the Riccati equation cannot be integrated: {solution.message}"])
+        raise ParameterError([f"the Riccati equation cannot be integrated: {solution.message}"])
     L = solution.y.T.reshape(-1, n, n)
     return 0.5 * (L + L.transpose(0, 2, 1))
 
