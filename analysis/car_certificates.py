@@ -1,4 +1,4 @@
-"""Certificates of almost stability for the car on a road of its FMU: model, norms, and how long the pieces must last."""
+"""Certificates of almost stability for the car on its road: model, norms, and how long the pieces must last."""
 
 from __future__ import annotations
 
@@ -25,13 +25,13 @@ SETTLED_PERIODIC = 14.0  # and this many if it goes on: what is left of the star
 
 
 def model_of(parameters: Mapping[str, Any], gain: Array | None = None) -> dict[str, Any]:
-    """The model of a certificate: the parameters of car and road, and a constant gain of the actuators (u = −gain x)."""
+    """The model of a certificate: the parameters of car and road, and a constant gain (u = −gain x)."""
     model: dict[str, Any] = {"kind": "car", "parameters": dict(parameters)}
     return model if gain is None else {**model, "gain": gain.tolist()}
 
 
 def build(model: dict[str, Any]) -> ExactSystem:
-    """The system that a certificate speaks of. Raises InputError for another kind, or for a car or road that cannot be."""
+    """The system of a certificate. Raises InputError for another kind, or for a car or road that cannot be."""
     if model.get("kind") != "car":
         raise InputError(f"model: wanted the kind 'car', got {model.get('kind')!r}")
     parameters, gain = _checked(model)

@@ -1,4 +1,4 @@
-"""The car on its road with nothing rounded: what proofs are about. Its numbers are the decimals that their floats say."""
+"""The car on its road with nothing rounded: what proofs speak of. Its numbers are the decimals that floats print."""
 
 from __future__ import annotations
 

@@ -138,8 +138,8 @@ def jacobian(system: ExactSystem, x: Balls, w: Balls, *, inputs: bool = False) -
     return arb_mat(columns).transpose()
 
 
-def two_norm(m: Array) -> float | Array:
-    """Upper bound of the spectral norm of float matrices (…, p, q) whose entries are exact.
+def two_norm(m: Array) -> Array:
+    """Upper bounds (…) of the spectral norms of float matrices (…, p, q) whose entries are exact.
 
     With V orthogonal up to round-off, MᵀM is similar to VᵀMᵀMV, and Gershgorin's rows bound that. The products are
     rounded: each entry by less than 1e-13 of the largest norm in the product, which the last factor covers.
@@ -147,4 +147,4 @@ def two_norm(m: Array) -> float | Array:
     gram = np.swapaxes(m, -1, -2) @ m
     V = np.linalg.eigh(gram)[1]
     rotated = np.swapaxes(V, -1, -2) @ gram @ V
-    return np.sqrt(np.abs(rotated).sum(axis=-1).max(axis=-1)) * (1.0 + 1e-11)
+    return np.asarray(np.sqrt(np.abs(rotated).sum(axis=-1).max(axis=-1)) * (1.0 + 1e-11))

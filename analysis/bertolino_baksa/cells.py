@@ -17,8 +17,8 @@ from .balls import Array, ExactSystem, above, matrix, rounded, two_norm
 from .norms import Metric, Norm
 from .tube import Piece, Tube
 
-CELLS = 12  # per piece, for e^(At) and the growth of perturbations
-FINER = 8  # times as many, for the norm of e
+CELLS = 8  # per piece, for e^(At) and the growth of perturbations
+FINER = 12  # times as many, for the norm of e
 EPS = 1e-13  # relative: covers the roundings of a polynomial's or a product's value, over the sum of its terms' sizes
 
 
@@ -78,7 +78,8 @@ def decay(metric: Metric, pieces: tuple[Piece, ...]) -> Decay:
             off = max(off, rest)
     values, width = np.array(ends), np.repeat(widths, CELLS)
     spread = np.repeat([expm(A_size * w * (1 + EPS)) for w in widths], CELLS, axis=0)  # ≥ |e^(As)|, 0 ≤ s ≤ Δ
-    second = np.abs((rounded(A)[0] @ rounded(A)[0]) @ values[:-1]) + 1e-9
+    second = np.abs((rounded(A)[0] @ rounded(A)[0]) @ values[:-1])
+    second += 1e-9 * second.max()  # its rounding, with much to spare
     curve = (second @ spread) * (width**2 / 8)[:, None, None] * (1 + 1e-9)
     return Decay(np.repeat(np.arange(len(pieces)), CELLS), width, values, curve, off)
 

@@ -29,11 +29,11 @@ FIRST = 1e-3  # of the floor: what the smallest δ may add to it
 MARGIN = 1e-6  # relative, by which claims stand off what was proved
 MAX_BYTES = 200_000_000
 THEOREM = (
-    "Let psi = x_lin be the solution of the linear part x' = A x + B w(t) of x' = F(x, w(t)) with psi(0) = x0. For every "
-    "eps >= l let delta(eps) be the largest delta of the table whose eps is not above it. Then every solution x with "
-    "N(x(0) - psi(0)) < delta(eps) satisfies N(x(t) - psi(t)) < eps for all t >= 0: psi is an almost stable approximate "
-    "solution (definition 2.1, Bertolino and Baksa). N(x) = |T x|_2, or max |(T x)_i| where the norm says so; all "
-    "numbers are SI and exact as printed."
+    "Let psi = x_lin be the solution of the linear part x' = A x + B w(t) of x' = F(x, w(t)) with psi(0) = x0. For "
+    "every eps >= l let delta(eps) be the largest delta of the table whose eps is not above it. Then every solution x "
+    "with N(x(0) - psi(0)) < delta(eps) satisfies N(x(t) - psi(t)) < eps for all t >= 0: psi is an almost stable "
+    "approximate solution (definition 2.1, Bertolino and Baksa). N(x) = |T x|_2, or max |(T x)_i| where the norm says "
+    "so; all numbers are SI and exact as printed."
 )
 Build = Callable[[dict[str, Any]], ExactSystem]
 

@@ -8,6 +8,7 @@ for all y(0) with N(y(0)) ≤ δ. Many δ at once.
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 
@@ -29,14 +30,14 @@ def perturbed(
     """
     n, S, reach = len(metric.S), np.abs(metric.S), metric.reach[:, None]
     v, largest = np.array(v0, dtype=float), np.empty((len(X), len(v0)))
-    still = np.zeros((X.shape[1] - n, len(v0)))
+    still, at_X = np.zeros((X.shape[1] - n, len(v0))), bound(X.T).T
 
     def forcing(cell: int, size: Array) -> Array:
-        change = bound.change(X[cell], np.concatenate([spread[cell] + reach * size, still]))
+        change = bound.change(X[cell], at_X[cell], np.concatenate([spread[cell] + reach * size, still]))
         return np.sqrt(((S @ change) ** 2).sum(axis=0)) * (1.0 + 1e-12)
 
     for cell, width in enumerate(widths.tolist()):
-        top, pushed = _held(lambda size, cell=cell: forcing(cell, size), v, width)
+        top, pushed = _held(partial(forcing, cell), v, width)
         largest[cell] = top
         v = (v * np.exp(-metric.alpha * width) + width * pushed) * (1.0 + 1e-12)
         v[~np.isfinite(top)] = np.inf
@@ -49,8 +50,8 @@ def _held(forcing: Callable[[Array], Array], v: Array, width: float) -> tuple[Ar
         top = v + 1.5 * width * forcing(v)
         for _ in range(ROUNDS):
             pushed = forcing(top)
-            fits = (v + width * pushed) * (1.0 + 1e-12) <= top
+            fits = ((v + width * pushed) * (1.0 + 1e-12) <= top) | ~np.isfinite(top)
             if fits.all():
                 return top, pushed
             top = np.where(fits, top, 2.0 * (v + width * pushed))
-    return np.where(fits, top, np.inf), np.where(fits, pushed, np.inf)
+    return np.where(fits, top, np.inf), pushed

@@ -1,8 +1,8 @@
-"""How far R(x, w) = F(x, w) − A x − B w can change: a majorant, polynomial with coefficients ≥ 0, and a bound of its tail.
+"""How far R(x, w) = F(x, w) − A x − B w can change: a majorant, a polynomial with coefficients ≥ 0 and a bounded tail.
 
-If |x_j| ≤ X_j and |y_j| ≤ Y_j then |R(x + y, w) − R(x, w)| ≤ R̄(X + Y, W) − R̄(X, W), row by row, where R̄ has the absolute
-values of R's coefficients. Up to ORDER these are computed with balls. The rest is bounded by evaluating the equations with
-numbers that keep only the sizes of coefficients (sin → sinh, cos → cosh), which cannot see terms cancel.
+If |x_j| ≤ X_j and |y_j| ≤ Y_j then |R(x + y, w) − R(x, w)| ≤ R̄(X + Y, W) − R̄(X, W), row by row, where R̄ has the
+absolute values of R's coefficients. Up to ORDER these are computed with balls. The rest is bounded by evaluating the
+equations with numbers that keep only the sizes of coefficients (sin → sinh, cos → cosh) and see no terms cancel.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ SLACK = 1e-12  # relative; a few hundred roundings of numbers ≥ 0 make less th
 
 @dataclass(frozen=True, slots=True)
 class Sizes:
-    """A power series known by its constant (a ball) and by a series in s that bounds the rest, coefficient by coefficient."""
+    """A power series: its constant, a ball, and a series in s that bounds the rest, coefficient by coefficient."""
 
     constant: Any
     rest: Any
@@ -87,7 +87,7 @@ def _at_zero(x: Sizes) -> None:
 
 @dataclass(frozen=True, slots=True)
 class Majorant:
-    """R̄ of a system: monomials (M, ORDER) of y = (x, w, 1), coefficients ≥ 0 (n, M), and the tail beyond ORDER at a box."""
+    """R̄ of a system: monomials (M, ORDER) of y = (x, w, 1), coefficients ≥ 0 (n, M), and its tail on a box."""
 
     monomials: NDArray[np.intp]
     coefficients: Array
@@ -96,17 +96,19 @@ class Majorant:
     slope: Array  # (n, n + m), bound of the tail's derivatives on the box; on s · box, s ≤ 1, s^ORDER times that
 
     def __call__(self, Y: Array) -> Array:
-        """R̄ (n, …) at sizes Y (n + m, …) ≥ 0, its tail left out; right but for SLACK."""
-        one = np.ones((1, *Y.shape[1:]))
-        return np.tensordot(self.coefficients, np.prod(np.concatenate([Y, one])[self.monomials], axis=1), axes=1)
+        """R̄ (n, K) at sizes Y (n + m, K) ≥ 0, its tail left out; right but for SLACK."""
+        factors = np.concatenate([Y, np.ones((1, Y.shape[1]))])[self.monomials]
+        return self.coefficients @ np.multiply.reduce(factors, axis=1)
 
-    def change(self, X: Array, Y: Array) -> Array:
-        """Bound (n, K) of |R(x + y, w) − R(x, w)|; X (n + m,) bounds (x, w), Y (n + m, K) bounds (y, 0). inf out of the box."""
+    def change(self, X: Array, at_X: Array, Y: Array) -> Array:
+        """Bound (n, K) of |R(x + y, w) − R(x, w)|, inf out of the box.
+
+        X (n + m,) bounds (x, w), Y (n + m, K) bounds (y, 0); at_X (n,) is R̄(X).
+        """
         far = X[:, None] + Y
-        s = np.max(far / self.box[:, None], axis=0)
+        s = (far / self.box[:, None]).max(axis=0)
         tail = np.where(s <= 1.0, s**ORDER, np.inf) * (self.slope @ Y) + self.crumbs[:, None]
-        with np.errstate(invalid="ignore"):
-            return (self(far) * (1.0 + SLACK) - self(X[:, None]) * (1.0 - SLACK) + tail) * (1.0 + SLACK)
+        return (self(far) * (1.0 + SLACK) - at_X[:, None] * (1.0 - SLACK) + tail) * (1.0 + SLACK)
 
 
 def majorant(system: ExactSystem, box: Array) -> Majorant:

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from flint import arb, fmpq
+from flint import arb
 
 from .balls import Array, ExactSystem, NotProvedError, above, column, jacobian
 from .cells import Decay, decay, errors, inputs, ranges
@@ -77,7 +77,7 @@ class Proof:
         x, e = self.ends
         size = (x + off) * (1.0 + 1e-12)
         L = self.rest_growth(size) if np.isfinite(size) else np.inf
-        if not L < self.metric.alpha:
+        if not self.metric.alpha > L:
             return np.inf
         return (e + off + L * size / (self.metric.alpha - L)) * (1.0 + 1e-12)
 
@@ -100,7 +100,7 @@ class Proof:
 
 
 def prove(system: ExactSystem, metric: Metric, pieces: Sequence[Piece], x0: Sequence[float]) -> Proof:
-    """Prove what can be proved from these pieces. Raises NotProvedError if they do not begin at 0, or do not suffice."""
+    """Prove what can be proved from these pieces. Raises NotProvedError if they do not suffice."""
     if pieces[0].begin != 0:
         raise NotProvedError(f"the first piece begins at t = {float(pieces[0].begin):g} s; wanted 0")
     if pieces[-1].end < system.pieces[-1][0]:

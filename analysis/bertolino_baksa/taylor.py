@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -28,7 +28,7 @@ def find_pieces(system: ExactSystem, x0: Sequence[float], stop: fmpq) -> list[Pi
         with precision(DEGREE + 1):
             w = system.inputs_at(t)(arb_series([arb(t), 1]))
         linear = _linear_taylor(A, B, x_lin, w)
-        full = _taylor(lambda y, w=w: system.equations(y, w, sine, cosine), x)
+        full = _taylor(system, w, x)
         size = max(size, *(abs(float(c[0])) for c in full))
         left = min([c for c in corners if c > t] + [stop]) - t
         pieces.append(_scaled(linear, full, t, t + _fitting(_length(full, size), left)))
@@ -48,12 +48,12 @@ def _linear_taylor(A: arb_mat, B: arb_mat, x0: arb_mat, w: Sequence[Any]) -> lis
     return [[term[i, 0] for term in terms] for i in range(A.nrows())]
 
 
-def _taylor(rate: Callable[[list[Any]], Sequence[Any]], x0: Sequence[Any]) -> list[list[Any]]:
-    """Coefficients of y' = rate(y), y(0) = x0, one more with each pass."""
+def _taylor(system: ExactSystem, w: Sequence[Any], x0: Sequence[Any]) -> list[list[Any]]:
+    """Coefficients of y' = F(y, w), y(0) = x0, one more with each pass."""
     terms = [[v.mid()] for v in x0]
     for k in range(DEGREE):
         with precision(k + 1):
-            slopes = rate([arb_series(c) for c in terms])
+            slopes = system.equations([arb_series(c) for c in terms], w, sine, cosine)
             for c, slope in zip(terms, slopes, strict=True):
                 c.append((coefficients(slope, k + 1)[k] / (k + 1)).mid())
     return terms

@@ -1,6 +1,6 @@
 """The validated reference: polynomials near x_lin and near e = x − x_lin, and a proved tube around them.
 
-Both x_lin and the motion x of the full equations, with the same x(0), run within V of their polynomials in the metric S:
+Both x_lin and the motion x of the full equations, with the same x(0), run within V of their polynomials in metric S:
 
     V' ≤ (−α + L) V + ‖defect‖_S        L: bound of ‖∂F/∂x − A‖_S on the tube
 
@@ -26,7 +26,6 @@ from .balls import (
     column,
     cosine,
     jacobian,
-    length,
     precision,
     sine,
 )
@@ -38,7 +37,7 @@ TRIES = 60  # of a wider tube, before a piece is given up
 
 @dataclass(frozen=True, slots=True)
 class Piece:
-    """Coefficients (n, degree + 1) of τᵏ, τ = (t − begin)/(end − begin), near x_lin and near e; begin, end exact [s]."""
+    """Coefficients (n, degree + 1) of τᵏ near x_lin and near e, τ = (t − begin)/(end − begin); times exact [s]."""
 
     begin: fmpq
     end: fmpq
