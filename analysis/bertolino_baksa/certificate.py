@@ -26,6 +26,8 @@ from .tube import Piece
 FORMAT = 1
 ROWS = 24  # of a table δ(ε)
 FIRST = 1e-3  # of the floor: what the smallest δ may add to it
+FLOOR = 1e-6  # of the motion: a smaller floor is not told from none
+CLOSE = 0.8  # of the first δ that failed: near enough for a largest δ
 MARGIN = 1e-6  # relative, by which claims stand off what was proved
 MAX_BYTES = 200_000_000
 THEOREM = (
@@ -84,36 +86,37 @@ def certify(
         system = build(model)
         pieces = tuple(find_pieces(system, x0.tolist(), stop))
         proof = prove(system, proved_metric(system, S), pieces, x0.tolist())
-        x_lin = np.concatenate(
-            [p.linear @ (np.linspace(0, 1, 9) ** np.arange(p.linear.shape[1])[:, None]) for p in pieces], axis=1
-        )
+        x_lin = np.concatenate([values(p.linear) for p in pieces], axis=1)
         claims = tuple(_claim(proof, norm, float(norm(x_lin).max())) for norm in norms(x_lin))
     return Certificate(model, x0, S, pieces, claims), proof
 
 
+def values(coefficients: Array, points: int = 9) -> Array:
+    """A piece's polynomials (n, points) at even times over the piece, its ends among them."""
+    return coefficients @ np.linspace(0.0, 1.0, points) ** np.arange(coefficients.shape[1])[:, None]
+
+
 def _claim(proof: Proof, norm: Norm, scale: float) -> Claim:
-    """The table with the largest δ that is found, its smallest δ raising the floor by but FIRST of it."""
-    floor = float(proof.epsilon(norm, np.array([0.0]))[0])
+    """The table with the largest δ that is found; its smallest δ raises the floor by but FIRST of it.
+
+    scale : N of the largest motion of x_lin, or 1 where that rests; a floor of 0 becomes FLOOR of it, as l > 0.
+    """
+    scale = scale or 1.0
+    floor = max(float(proof.epsilon(norm, np.array([0.0]))[0]), FLOOR * scale)
     if not floor < np.inf:
         raise NotProvedError(f"no bound for all t in the {norm.name} norm")
     first = FIRST * floor / float(proof.decay.of(norm).max())
-    top = max(16.0 * scale, 2.0 * first)
-    for _ in range(40):
-        delta = _spread(first, top)
-        epsilon = _epsilon(proof, norm, delta)
-        proved = np.count_nonzero(np.isfinite(epsilon))
-        if proved and (proved == len(delta) or delta[proved - 1] > 0.7 * top):
-            break
-        if not proved and top <= first * 1.001:
+    top, proved = max(16.0 * scale, 2.0 * first), 0
+    while not proved or (proved < len(delta) and delta[proved - 1] < CLOSE * top):
+        if top <= first:
             raise NotProvedError(f"no delta > 0 in the {norm.name} norm")
-        top = delta[proved] if proved else top / 16.0
-        first = min(first, top / 2.0)
+        delta = np.concatenate([np.geomspace(first, top, ROWS), [CLOSE * top]])
+        delta.sort()
+        epsilon = _epsilon(proof, norm, delta)
+        proved = int(np.argmin(np.append(np.isfinite(epsilon), False)))
+        top = top / 16.0 if not proved else delta[min(proved, len(delta) - 1)]
     epsilon, delta = np.maximum.accumulate(epsilon[:proved]) * (1.0 + MARGIN), delta[:proved] * (1.0 - MARGIN)
-    return Claim(norm, np.stack([epsilon, delta], axis=1))
-
-
-def _spread(first: float, top: float) -> Array:
-    return np.unique(np.concatenate([np.geomspace(first, top, ROWS), top * np.linspace(0.5, 1.0, 6)]))
+    return Claim(norm, np.stack([np.maximum(epsilon, floor), delta], axis=1))
 
 
 def _epsilon(proof: Proof, norm: Norm, delta: Array) -> Array:
