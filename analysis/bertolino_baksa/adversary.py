@@ -30,7 +30,7 @@ def motions(
     x, ones = x0, np.ones(x0.shape[1])
     yield edges[0], x
     for piece, begin, end in zip(signal.pieces, edges, edges[1:], strict=False):
-        times = np.linspace(begin, end, int(np.ceil((end - begin) / step)) + 1)
+        times = np.linspace(begin, end, int(np.ceil((end - begin) / STEP)) + 1)
         for t, later in zip(times[:-1].tolist(), times[1:].tolist(), strict=True):
             h = later - t
             w0, w1, w2 = (piece(s)[:, None] * ones for s in (t, t + 0.5 * h, later))
@@ -57,10 +57,11 @@ def worst(
 ) -> tuple[float, Array]:
     """A large sup N(x − x_lin) over the starts with N(x(0) − x0) ≤ delta, and its start's offset (n,).
 
-    The first starts are those that the linear part carries furthest, at many times; then a local search around the worst.
+    The first starts are those that the linear part carries furthest, at many times; then a search around the worst.
     """
     rng = np.random.default_rng(seed)
-    crowd = np.concatenate([_vertices(form, norm, stop), -_vertices(form, norm, stop)], axis=1) * delta
+    vertices = _vertices(form, norm, stop)
+    crowd = np.concatenate([vertices, -vertices], axis=1) * delta
     best, at = 0.0, crowd[:, 0]
     for k in range(ROUNDS + 1):
         reached = excursions(form, signal, [norm], x0, crowd, stop)[0]

@@ -106,15 +106,16 @@ def _claim(proof: Proof, norm: Norm, scale: float) -> Claim:
     if not floor < np.inf:
         raise NotProvedError(f"no bound for all t in the {norm.name} norm")
     first = FIRST * floor / float(proof.decay.of(norm).max())
-    top, proved = max(16.0 * scale, 2.0 * first), 0
-    while not proved or (proved < len(delta) and delta[proved - 1] < CLOSE * top):
-        if top <= first:
-            raise NotProvedError(f"no delta > 0 in the {norm.name} norm")
-        delta = np.concatenate([np.geomspace(first, top, ROWS), [CLOSE * top]])
-        delta.sort()
+    top = max(16.0 * scale, 2.0 * first)
+    while top > first:
+        delta = np.sort(np.append(np.geomspace(first, top, ROWS), CLOSE * top))
         epsilon = _epsilon(proof, norm, delta)
         proved = int(np.argmin(np.append(np.isfinite(epsilon), False)))
-        top = top / 16.0 if not proved else delta[min(proved, len(delta) - 1)]
+        if proved == len(delta) or (proved and delta[proved - 1] >= CLOSE * top):
+            break
+        top = delta[proved] if proved else top / 16.0
+    else:
+        raise NotProvedError(f"no delta > 0 in the {norm.name} norm")
     epsilon, delta = np.maximum.accumulate(epsilon[:proved]) * (1.0 + MARGIN), delta[:proved] * (1.0 - MARGIN)
     return Claim(norm, np.stack([np.maximum(epsilon, floor), delta], axis=1))
 
