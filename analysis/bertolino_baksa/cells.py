@@ -6,6 +6,7 @@ bounds here are values at the cells' ends plus a term of second order in the cel
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,7 +16,7 @@ from scipy.linalg import expm
 
 from .balls import Array, ExactSystem, above, matrix, rounded, two_norm
 from .norms import Metric, Norm
-from .tube import Piece, Tube
+from .tube import Outputs, Piece, Tube, enclosed_series
 
 CELLS = 8  # per piece, for e^(At) and the growth of perturbations
 FINER = 12  # times as many, for the norm of e
@@ -84,10 +85,10 @@ def decay(metric: Metric, pieces: tuple[Piece, ...]) -> Decay:
     return Decay(np.repeat(np.arange(len(pieces)), CELLS), width, values, curve, off)
 
 
-def ranges(tube: Tube, metric: Metric) -> Array:
-    """X (N, n) ≥ sup |x_j| over each of the cells of `decay`, for the motion x from the tube."""
+def ranges(pieces: Sequence[Piece], off: Array, metric: Metric) -> Array:
+    """X (N, n) ≥ sup |x_j| over each of the cells of `decay`, for motions within `off` (pieces,) of the pieces' x."""
     found = []
-    for piece, V in zip(tube.pieces, tube.full, strict=True):
+    for piece, V in zip(pieces, off, strict=True):
         values, bend = _sampled(piece.linear + piece.error, CELLS)
         found.append(np.maximum(np.abs(values[:, :-1]), np.abs(values[:, 1:])).T + bend + V * metric.reach)
     return np.concatenate(found) * (1 + EPS)
@@ -124,3 +125,14 @@ def _sampled(coefficients: Array, cells: int, sizes: Array | None = None) -> tup
     sizes = np.abs(coefficients) if sizes is None else sizes
     second = (sizes * k * (k - 1)).sum(axis=1)
     return coefficients @ powers, second / (8.0 * cells**2) + EPS * sizes.sum(axis=1)
+
+
+def outputs(system: ExactSystem, tube: Tube, metric: Metric, functions: Outputs) -> tuple[Array, Array]:
+    """Smallest and largest value (k,) of the outputs functions(x, w, sin, cos) along x, over all pieces."""
+    low, high = [], []
+    for piece, V in zip(tube.pieces, tube.full, strict=True):
+        centres, rest = enclosed_series(system, piece, functions, metric.reach * V)
+        values, bend = _sampled(centres, CELLS * FINER)
+        low.append((values - bend[:, None]).min(axis=1) - rest)
+        high.append((values + bend[:, None]).max(axis=1) + rest)
+    return np.min(low, axis=0), np.max(high, axis=0)

@@ -116,8 +116,12 @@ def _claim(proof: Proof, norm: Norm, scale: float) -> Claim:
         top = delta[proved] if proved else top / 16.0
     else:
         raise NotProvedError(f"no delta > 0 in the {norm.name} norm")
-    epsilon, delta = np.maximum.accumulate(epsilon[:proved]) * (1.0 + MARGIN), delta[:proved] * (1.0 - MARGIN)
-    return Claim(norm, np.stack([np.maximum(epsilon, floor), delta], axis=1))
+    delta = delta[:proved] * (1.0 - MARGIN)
+    epsilon = _epsilon(proof, norm, delta)  # once more: the bounds depend on the largest δ
+    while not np.all(np.isfinite(epsilon)):
+        delta = delta[:-1]
+        epsilon = _epsilon(proof, norm, delta)
+    return Claim(norm, np.stack([np.maximum.accumulate(epsilon) * (1.0 + MARGIN), delta], axis=1))
 
 
 def _epsilon(proof: Proof, norm: Norm, delta: Array) -> Array:

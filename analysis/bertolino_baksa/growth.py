@@ -25,15 +25,16 @@ def perturbed(
     """v over each cell (N, K) and at the end (K,); inf where no bound is found.
 
     widths : of the cells (N,) [s].  X : bounds (N, n + m) of (x, w) over them.
-    spread : bounds (N, n, K) of |y − q| over the cells: of the part of y that is known without R.
+    spread : bounds (N, n + m, K) over the cells of what is known without R: of |y − q|, and of changes of w.
     v0     : ‖q‖_S at the begin (K,).
     """
-    n, S, reach = len(metric.S), np.abs(metric.S), metric.reach[:, None]
+    n, S = len(metric.S), np.abs(metric.S)
     v, largest = np.array(v0, dtype=float), np.empty((len(X), len(v0)))
-    still, at_X = np.zeros((X.shape[1] - n, len(v0))), bound(X.T).T
+    at_X = bound(X.T).T
+    reach = np.concatenate([metric.reach, np.zeros(X.shape[1] - n)])[:, None]
 
     def forcing(cell: int, size: Array) -> Array:
-        change = bound.change(X[cell], at_X[cell], np.concatenate([spread[cell] + reach * size, still]))
+        change = bound.change(X[cell], at_X[cell], spread[cell] + reach * size)
         return np.sqrt(((S @ change) ** 2).sum(axis=0)) * (1.0 + 1e-12)
 
     for cell, width in enumerate(widths.tolist()):

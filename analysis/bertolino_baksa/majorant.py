@@ -107,7 +107,7 @@ class Majorant:
         """
         far = X[:, None] + Y
         s = (far / self.box[:, None]).max(axis=0)
-        tail = np.where(s <= 1.0, s**ORDER, np.inf) * (self.slope @ Y) + self.crumbs[:, None]
+        tail = np.where(s <= 1.0, s**ORDER * (self.slope @ Y), np.inf) + self.crumbs[:, None]
         return (self(far) * (1.0 + SLACK) - at_X[:, None] * (1.0 - SLACK) + tail) * (1.0 + SLACK)
 
 

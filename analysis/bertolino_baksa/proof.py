@@ -49,7 +49,8 @@ class Proof:
         """
         rows, kappa, c = self.decay.rows(norm), self.decay.of(norm), self.metric.of(norm)
         bound = self.majorant(rows.max(axis=0) * delta.max())
-        spread = rows[:, :, None] * delta
+        spread = np.zeros((*self.X.shape, len(delta)))
+        spread[:, : self.system.n] = rows[:, :, None] * delta
         top, end = perturbed(self.metric, bound, self.decay.width, self.X, spread, np.zeros(len(delta)))
         on_pieces = errors(self.tube, self.metric, norm)[:, None] + kappa[:, None] * delta + c * top
         later = self._later(norm, bound, self.decay.at_end(self.metric, norm) * delta + end)
@@ -68,7 +69,7 @@ class Proof:
             return np.array([c * self._at_rest(u) for u in off.tolist()])
         window, X = self.repetition.window, self.repetition.X
         widths, off = self.decay.width[-len(X) :], off + 1e-9 * self.ends[0]  # room for roundings where nothing is off
-        top, end = perturbed(self.metric, bound, widths, X, np.zeros((len(X), self.system.n, len(off))), off)
+        top, end = perturbed(self.metric, bound, widths, X, np.zeros((*X.shape, len(off))), off)
         most = errors(window, self.metric, norm).max() + c * top.max(axis=0)
         return np.where(end <= off, most, np.inf)
 
@@ -76,18 +77,10 @@ class Proof:
         """sup ‖e + y‖_S on the flat road, where x' = A x + R(x) and ‖R(x)‖ ≤ L ‖x‖ with L < α: x → 0, as x_lin does."""
         x, e = self.ends
         size = (x + off) * (1.0 + 1e-12)
-        L = self.rest_growth(size) if np.isfinite(size) else np.inf
+        L = rest_growth(self.system, self.metric, size)
         if not self.metric.alpha > L:
             return np.inf
         return (e + off + L * size / (self.metric.alpha - L)) * (1.0 + 1e-12)
-
-    def rest_growth(self, size: float) -> float:
-        """L ≥ ‖∂F/∂x − A‖_S where ‖x‖_S ≤ size and w = 0; inf if there is no bound."""
-        box = [arb(0, n * size) for n in self.metric.reach.tolist()]
-        try:
-            return self.metric.size(jacobian(self.system, box, [arb(0)] * self.system.m) - self.metric.A)
-        except NotProvedError:
-            return np.inf
 
     @property
     def ends(self) -> tuple[float, float]:
@@ -106,10 +99,10 @@ def prove(system: ExactSystem, metric: Metric, pieces: Sequence[Piece], x0: Sequ
     if pieces[-1].end < system.pieces[-1][0]:
         raise NotProvedError("the pieces end before the road's last corner")
     tube = prove_tube(system, metric, pieces, (np.array(x0, dtype=float), np.zeros(system.n)))
-    X = np.hstack([ranges(tube, metric), inputs(system, tube.pieces)])
+    X = np.hstack([ranges(tube.pieces, tube.full, metric), inputs(system, tube.pieces)])
     again = _repetition(system, metric, tube) if system.period != 0 else None
     proof = Proof(system, metric, tube, decay(metric, tube.pieces), X, again)
-    if again is None and not proof.rest_growth(proof.ends[0]) < metric.alpha:
+    if again is None and not rest_growth(system, metric, proof.ends[0]) < metric.alpha:
         raise NotProvedError("at the end of the last piece the motion is still too large to be proved to die out")
     return proof
 
@@ -129,7 +122,7 @@ def _repetition(system: ExactSystem, metric: Metric, tube: Tube) -> Repetition:
     returned = [max(v, t) + j for v, t, j in zip(window.at_end, tube.at_end, jump, strict=True)]
     if not all(v * (1.0 + 1e-15) <= o for v, o in zip(returned, off, strict=True)):
         raise NotProvedError("the tube of one period does not come back into itself")
-    return Repetition(window, np.hstack([ranges(window, metric), inputs(system, pieces)]))
+    return Repetition(window, np.hstack([ranges(window.pieces, window.full, metric), inputs(system, pieces)]))
 
 
 def _window(system: ExactSystem, pieces: Sequence[Piece]) -> int:
@@ -139,3 +132,14 @@ def _window(system: ExactSystem, pieces: Sequence[Piece]) -> int:
         if periods.denominator == 1 and pieces[k].begin >= system.pieces[-1][0]:
             return k
     raise NotProvedError("no whole number of periods at the end of the pieces")
+
+
+def rest_growth(system: ExactSystem, metric: Metric, size: float) -> float:
+    """L ≥ ‖∂F/∂x − A‖_S where ‖x‖_S ≤ size and w = 0; inf if there is no bound."""
+    if not size < np.inf:
+        return np.inf
+    box = [arb(0, n * size) for n in metric.reach.tolist()]
+    try:
+        return metric.size(jacobian(system, box, [arb(0)] * system.m) - metric.A)
+    except NotProvedError:
+        return np.inf

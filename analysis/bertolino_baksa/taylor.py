@@ -16,8 +16,11 @@ LAST_TERM = 1e-14  # of a polynomial, over the size of the motion: it sets the l
 LONGEST = 0.25  # s
 
 
-def find_pieces(system: ExactSystem, x0: Sequence[float], stop: fmpq) -> list[Piece]:
-    """Pieces from x(0) = x0 [exact doubles] to `stop`, none across a corner of the input or the last period's begin."""
+def find_pieces(system: ExactSystem, x0: Sequence[float], stop: fmpq, *, linear_only: bool = False) -> list[Piece]:
+    """Pieces from x(0) = x0 [exact doubles] to `stop`, none across a corner of the input or the last period's begin.
+
+    linear_only : e is left at 0.
+    """
     zero = [arb(0)]
     A = jacobian(system, zero * system.n, zero * system.m)
     B = jacobian(system, zero * system.n, zero * system.m, inputs=True)
@@ -28,7 +31,7 @@ def find_pieces(system: ExactSystem, x0: Sequence[float], stop: fmpq) -> list[Pi
         with precision(DEGREE + 1):
             w = system.inputs_at(t)(arb_series([arb(t), 1]))
         linear = _linear_taylor(A, B, x_lin, w)
-        full = _taylor(system, w, x)
+        full = linear if linear_only else _taylor(system, w, x)
         size = max(size, *(abs(float(c[0])) for c in full))
         left = min([c for c in corners if c > t] + [stop]) - t
         pieces.append(_scaled(linear, full, t, t + _fitting(_length(full, size), left)))

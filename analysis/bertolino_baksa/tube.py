@@ -10,7 +10,7 @@ were found does not matter to the proof (`taylor.py` finds them).
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -31,6 +31,7 @@ from .balls import (
 )
 from .norms import Metric
 
+Outputs = Callable[[Sequence[Any], Sequence[Any], Any, Any], Sequence[Any]]
 MORE = 8  # terms of a defect's series beyond the polynomials' degree; what is left is enclosed
 TRIES = 60  # of a wider tube, before a piece is given up
 
@@ -77,7 +78,7 @@ def prove_tube(
 
     Raises NotProvedError where the pieces leave a gap or the tube cannot be closed.
     """
-    B = jacobian(system, [arb(0)] * system.n, [arb(0)] * system.m, inputs=True)
+    B = input_matrix(system)
     V_lin, V = off
     before = start[0][:, None], start[1][:, None]
     linear, full, rates = [], [], []
@@ -86,15 +87,31 @@ def prove_tube(
             raise NotProvedError(f"pieces {k - 1} and {k} do not follow each other")
         jump_lin, jump = jumps(metric, before, piece)
         V_lin, V = V_lin + jump_lin, V + jump
-        defect_lin, defect = _linear_defect(system, metric, B, piece), _defect(system, metric, piece)
-        after, growth = _closed(system, metric, piece, V, defect)
-        after_lin = _grown(V_lin, -metric.alpha, defect_lin, piece)
+        after, growth = _closed(system, metric, piece, V, _defect(system, metric, piece))
+        after_lin = _grown(V_lin, -metric.alpha, _linear_defect(system, metric, B, piece), piece)
         linear.append(max(V_lin, after_lin))
         full.append(max(V, after))
         rates.append(growth)
         V_lin, V = after_lin, after
         before = piece.linear, piece.error
     return Tube(tuple(pieces), np.array(linear), np.array(full), (V_lin, V), np.array(rates))
+
+
+def prove_linear(system: ExactSystem, metric: Metric, pieces: Sequence[Piece]) -> Array:
+    """V (pieces,) of x_lin alone, from x_lin(0) = the first piece's begin on."""
+    B, V, before = input_matrix(system), 0.0, (pieces[0].linear[:, :1], pieces[0].error[:, :1])
+    found = []
+    for piece in pieces:
+        V += jumps(metric, before, piece)[0]
+        after = _grown(V, -metric.alpha, _linear_defect(system, metric, B, piece), piece)
+        found.append(max(V, after))
+        V, before = after, (piece.linear, piece.error)
+    return np.array(found)
+
+
+def input_matrix(system: ExactSystem) -> arb_mat:
+    """B (n, m)."""
+    return jacobian(system, [arb(0)] * system.n, [arb(0)] * system.m, inputs=True)
 
 
 def both(piece: Piece) -> list[list[Any]]:
@@ -142,20 +159,41 @@ def _linear_defect(system: ExactSystem, metric: Metric, B: arb_mat, piece: Piece
 
 
 def _defect(system: ExactSystem, metric: Metric, piece: Piece) -> float:
-    """sup ‖F(p, w) − p'‖_S [1/s]: all terms but the last at τ = 0, the last one over the whole piece."""
+    """sup ‖F(p, w) − p'‖_S [1/s]."""
+    h = arb(piece.duration)
+
+    def defect(y: Sequence[Any], w: Sequence[Any], sin: Any, cos: Any) -> list[Any]:
+        return [rate - yi.derivative() / h for rate, yi in zip(system.equations(y, w, sin, cos), y, strict=True)]
+
+    rows = _series(system, piece, defect, both(piece))
+    return _sup_length(metric, [c for row in rows for c in row], len(rows[0]))
+
+
+def _series(system: ExactSystem, piece: Piece, functions: Outputs, p: list[list[Any]]) -> list[list[Any]]:
+    """Coefficients of functions(p(τ), w(τ), sin, cos): all but the last at τ = 0, the last over the whole piece."""
     terms = piece.linear.shape[1] + MORE
-    p, h = both(piece), arb(piece.duration)
     found: list[list[list[Any]]] = []
     with precision(terms + 1):
         for centre in (arb(0), arb(0.5, 0.5)):
             shift = arb_poly([centre, 1])
             y = [arb_series(arb_poly(c)(shift).coeffs() or [0], prec=terms + 1) for c in p]
             w = [arb_series(c, prec=terms + 1) for c in _inputs(system, piece, centre, terms + 1)]
-            rates = system.equations(y, w, sine, cosine)
-            defects = [rate - yi.derivative() / h for rate, yi in zip(rates, y, strict=True)]
-            found.append([coefficients(d, terms) for d in defects])
-    mixed = [[*at[:-1], over[-1]] for at, over in zip(*found, strict=True)]
-    return _sup_length(metric, [c for row in mixed for c in row], terms)
+            found.append([coefficients(value, terms) for value in functions(y, w, sine, cosine)])
+    return [[*at[:-1], over[-1]] for at, over in zip(*found, strict=True)]
+
+
+def enclosed_series(system: ExactSystem, piece: Piece, functions: Outputs, off: Array) -> tuple[Array, Array]:
+    """Outputs along all x with |x_j − p_j| ≤ off_j: coefficients (k, terms) of τᵏ, and how far (k,) they may be off."""
+    p = both(piece)
+    for row, radius in zip(p, off.tolist(), strict=True):
+        row[0] = row[0] + arb(0, radius)
+    rows = _series(system, piece, functions, p)
+    centres = [[float(c.mid()) for c in row[:-1]] for row in rows]
+    rest = [
+        sum(above(c - arb(near)) for c, near in zip(row, nears, strict=False)) + above(row[-1])
+        for row, nears in zip(rows, centres, strict=True)
+    ]
+    return np.array(centres), np.array(rest) * (1.0 + 1e-13)
 
 
 def _sup_length(metric: Metric, entries: Sequence[Any], terms: int) -> float:
