@@ -1,7 +1,7 @@
 """The seven-degree-of-freedom car derived from nothing but its energies, by Lagrange's equations, in symbols.
 
 The truth that the hand-written equations (`fmu_src.vehicle`) and the printed ones are compared with, so it must never
-import either. Coordinates q = (z, ψ, φ, z11, z12, z2, ψ2) from static equilibrium, signs as in `fmu_src.vehicle.equations`
+import either. Coordinates q = (z, ψ, φ, z11, z12, z2, ψ2) from static equilibrium, signs as in the FMU
 (ψ2 positive like ψ); SI units. Corners stand in the order fl, fr, rl, rr, which for the road is h11, h12, h21, h22.
 """
 
