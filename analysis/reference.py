@@ -128,6 +128,7 @@ def in_stretches(
     *,
     rtol: float = 1e-12,
     atol: float | None = None,
+    method: str = "DOP853",
 ) -> Array:
     """States (n, len(x0)) at `times` (n,) [s] of x' = rate(t, x) from x0 at times[0], restarted at each corner [s].
 
@@ -146,7 +147,7 @@ def in_stretches(
 
         within = (times > begin) & (times <= end)
         sampled = np.union1d(times[within], end)
-        solution = solve_ivp(inside, (begin, end), x, method="DOP853", t_eval=sampled, **tolerances)
+        solution = solve_ivp(inside, (begin, end), x, method=method, t_eval=sampled, **tolerances)
         if not solution.success:
             raise InputError(f"from t = {begin:g} s the motion cannot be integrated: {solution.message}")
         states[within], x = solution.y.T[: np.count_nonzero(within)], solution.y[:, -1]

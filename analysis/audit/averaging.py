@@ -27,6 +27,11 @@ def rows() -> list[Row]:
     return [_limit(), _pairs(), _A(), _B(), _factor(), _condition(), *_resonances()]
 
 
+def over_orders(alpha: Complex) -> Complex:
+    """ᾱ_ijkl of (3.20), the sum of α over the six orders of j, k, l."""
+    return np.sum([alpha.transpose(0, *order) for order in permutations((1, 2, 3))], axis=0)
+
+
 @dataclass(frozen=True, slots=True)
 class Textbook:
     """ξ_k' − λ_k ξ_k = f_k + ε R_k(ξ) + ε P_k(t, ξ), modes ordered λ_1 … λ_n/2 and then their conjugates.
@@ -46,8 +51,8 @@ class Textbook:
 
     @property
     def alpha_bar(self) -> Complex:
-        """ᾱ_ijkl of (3.20), the sum over the six orders of j, k, l."""
-        return sum(self.alpha.transpose(0, *order) for order in permutations((1, 2, 3)))
+        """ᾱ_ijkl."""
+        return over_orders(self.alpha)
 
     def xi(self, t: NDArray[np.float64] = T) -> Complex:
         """s_k exp(iβ_k t) + P_k sin(Ωt + ψ_k), (n, len(t))."""
@@ -217,8 +222,7 @@ def _car() -> tuple[Complex, Complex, Complex, Complex]:
     x = (K @ (P[:, None] * np.sin(w * t + psi[:, None]))).real
     slope = 3.0 * np.einsum("ijkl,kt,lt->ij", r, x, x, optimize=True) / len(t)  # mean derivative of R by the state
     truth = np.einsum("ai,ij,ja->a", np.linalg.inv(K), slope, K)
-    bar = sum(alpha.transpose(0, *order) for order in permutations((1, 2, 3)))
-    return bar, P, psi, truth
+    return over_orders(alpha), P, psi, truth
 
 
 def _B() -> Row:
@@ -248,7 +252,7 @@ def _factor() -> Row:
         derived="… + ε Σ_j ᾱ_kkjj+7 s_j s_j+7",
         evidence=[
             _relative(
-                "largest error of ṡ_k − α_k s_k at ε = 0.01, system of 2 oscillators on a flat road, sum halved as above",
+                "largest error of ṡ_k − α_k s_k at ε = 0.01, 2 oscillators on a flat road, sum halved as above",
                 _missed(mean, x.s * pairs),
                 _missed(mean, epsilon * x.s * pairs),
             )
@@ -277,6 +281,7 @@ def _condition() -> Row:
 
 
 # ------------------------------------------------------------------ resonances
+Cases = Sequence[tuple[Sequence[int], int]]  # β, Ω (0: flat road)
 Criterion = Callable[[Sequence[int], int], bool]
 
 
@@ -292,7 +297,7 @@ def printed_internal(beta: Sequence[int], _: int) -> bool:
 
 
 def cubic_condition(beta: Sequence[int], W: int) -> bool:
-    """Resonance if ±ω_1 ± ω_2 ± ω_3 = β_i, each ω a β or the road's (W > 0), in other ways than by pairs that cancel."""
+    """Resonance if ±ω_1 ± ω_2 ± ω_3 = β_i, each ω a β or the road's (W > 0), but by pairs that cancel."""
     signed = [sign * b for b in (*beta, *([W] if W else [])) for sign in (1, -1)]
     for i, target in enumerate(beta):
         allowed = _cancelling(signed, 2 * i)
@@ -315,7 +320,7 @@ def is_resonant(beta: Sequence[int], W: int) -> bool:
     return _missed(x.R_mean(), formula) > 1e-9
 
 
-def wrong_verdicts(criterion: Criterion, cases: Sequence[tuple[Sequence[int], int]]) -> float:
+def wrong_verdicts(criterion: Criterion, cases: Cases) -> float:
     """How many of the cases a criterion judges otherwise than quadrature."""
     return float(sum(criterion(beta, W) != is_resonant(beta, W) for beta, W in cases))
 
@@ -325,9 +330,7 @@ FREE = [((b1, b2, b3), 0) for b1, b2, b3 in product((3, 4), (5, 6, 7, 8), (9, 10
 
 
 def _resonances() -> list[Row]:
-    def row(
-        equation: str, text: str, better: str, criterion: Criterion, cases: list[tuple[tuple[int, ...], int]]
-    ) -> Row:
+    def row(equation: str, text: str, better: str, criterion: Criterion, cases: Cases) -> Row:
         example = next(c for c in cases if criterion(*c) != is_resonant(*c))
         return Row(
             equation=equation,
@@ -350,14 +353,14 @@ def _resonances() -> list[Row]:
         row(
             "no-resonance condition before (3.20)",
             "β_k ≠ β_l, β_k ≠ νΩ",
-            "no β_i = ±ω_1 ± ω_2 ± ω_3 with each ω a β_j or a νΩ, but by pairs that cancel (so β_i ± β_j ≠ (μ ± ν)Ω too)",
+            "no β_i = ±ω_1 ± ω_2 ± ω_3, each ω a β_j or a νΩ, but by pairs that cancel (so β_i ± β_j ≠ (μ ± ν)Ω too)",
             printed_condition,
             FORCED,
         ),
         row(
             "remark 3.2",
             "λ_j + λ_k − λ_l = 0, λ_j + λ_k + λ_l − λ_m = 0",
-            "of an odd system: β_j + β_k + β_l = β_m and β_j + β_k = β_l + β_m but by equal pairs; the first never matters",
+            "in an odd system β_j + β_k + β_l = β_m and β_j + β_k = β_l + β_m but by equal pairs; never the first",
             printed_internal,
             FREE,
         ),

@@ -14,7 +14,7 @@ from fmu_src.vehicle.parameters import Car
 from ..derivation import derive
 from . import printed_car
 from .differences import Difference, derived_equations, differences, plain
-from .rows import Evidence, Row
+from .rows import RIGHT, Evidence, Row
 from .system import Array, System, derived, energy, planted, power_residual, printed
 
 CONVENTION = "B"  # needs the fewer changes of the print; the command counts both, and a test asserts it
@@ -188,7 +188,7 @@ def _statics() -> Row:
                 apart=1.0,
             ),
         ],
-        misprinted=False,
+        kind=RIGHT,
     )
 
 
@@ -362,7 +362,7 @@ def _gravity() -> Row:
                 apart=1.0,
             )
         ],
-        misprinted=False,
+        kind=RIGHT,
     )
 
 
@@ -393,5 +393,5 @@ def _form() -> Row:
                 apart=1.0,
             )
         ],
-        misprinted=False,
+        kind=RIGHT,
     )

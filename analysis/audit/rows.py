@@ -6,7 +6,11 @@ from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
-MISPRINT, RIGHT, UNDECIDED = "misprint", "right as printed", "NOT DECIDED"
+MISPRINT, RIGHT, REFUTED = "misprint", "right as printed", "claim refuted"
+"""Kinds of rows. A misprint fails where the derived form passes; what is right passes as the derived form does; a
+claim is refuted by a test that both the printed and the derived system pass."""
+
+UNDECIDED = "NOT DECIDED"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -25,10 +29,10 @@ class Evidence:
     tolerance: float
     apart: float
 
-    def decides(self, misprinted: bool) -> bool:
-        """Whether the derived form passes, and the printed one fails or passes as is claimed; nan never does."""
+    def decides(self, kind: str) -> bool:
+        """Whether the derived form passes, and the printed one fails or passes as the kind has it; nan never does."""
         off = abs(self.printed - self.expected)
-        as_claimed = off >= self.apart if misprinted else off <= self.tolerance
+        as_claimed = off >= self.apart if kind == MISPRINT else off <= self.tolerance
         return self.apart >= self.tolerance and abs(self.derived - self.expected) <= self.tolerance and as_claimed
 
 
@@ -40,21 +44,20 @@ class Row:
     printed: str
     derived: str
     evidence: Sequence[Evidence]
-    misprinted: bool = True
+    kind: str = MISPRINT
     note: str = ""
 
     @property
     def holds(self) -> bool:
         """Whether there is evidence and every number of it decides as the row claims."""
-        return bool(self.evidence) and all(e.decides(self.misprinted) for e in self.evidence)
+        return bool(self.evidence) and all(e.decides(self.kind) for e in self.evidence)
 
     @property
     def verdict(self) -> str:
-        if not self.holds:
-            return UNDECIDED
-        return MISPRINT if self.misprinted else RIGHT
+        """The kind, if the numbers bear it out."""
+        return self.kind if self.holds else UNDECIDED
 
     def as_json(self) -> dict[str, Any]:
         """All fields and the verdict."""
-        evidence = [{**asdict(e), "decides": e.decides(self.misprinted)} for e in self.evidence]
+        evidence = [{**asdict(e), "decides": e.decides(self.kind)} for e in self.evidence]
         return {**asdict(self), "evidence": evidence, "verdict": self.verdict}

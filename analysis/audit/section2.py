@@ -209,7 +209,7 @@ def w(force: Force, S_1: Force, v: Array, T: float) -> Array:
 
 
 def _w() -> Row:
-    """S already holds X: with S[τ, X v] X comes in twice, and the mean that is taken out is not that of what is left."""
+    """S already holds X: with S[τ, X v] it comes in twice, and another mean is taken out than there is."""
     doubled: Force = lambda t, v: S(t, _turned(t, v))  # noqa: E731
     S_1: Force = lambda t, v: mean(S, v)  # noqa: E731
     T = 2.0 * np.pi * 100
@@ -240,7 +240,7 @@ def _derivative(function: Callable[[Array], Array], v: Array) -> Array:
 
 
 def _right_side(t: float, v: Array, epsilon: float) -> tuple[Array, Array, Array]:
-    """v' at (t, v): exactly, from (2.7) with ζ = v + εw; by (2.13) as printed, its O(·) left out; with what it lacks."""
+    """v' at (t, v): exactly, from (2.7) with ζ = v + εw; by (2.13) as printed, without O(·); with what it lacks."""
     S_1: Force = lambda _, at: mean(S, at)  # noqa: E731
     pulled = pulled_back(S)
     w_there = w(S, S_1, v, t)
@@ -248,7 +248,7 @@ def _right_side(t: float, v: Array, epsilon: float) -> tuple[Array, Array, Array
     by_zeta = _derivative(lambda at: pulled(np.asarray(t), at), v)
     change = pulled(np.asarray(t), v + epsilon * w_there) - pulled(np.asarray(t), v)
     slope = mean(S, v)
-    exact = np.linalg.solve(np.eye(2) + epsilon * w_v, epsilon * (slope + change))
+    exact: Array = np.linalg.solve(np.eye(2) + epsilon * w_v, epsilon * (slope + change))
     as_printed = epsilon * slope - epsilon * w_v @ (epsilon * slope)
     return exact, as_printed, as_printed + epsilon**2 * by_zeta @ w_there
 

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from functools import cache
 
 import numpy as np
+from numpy.typing import NDArray
 
 from fmu_src.quantities import PARAMETERS
 from fmu_src.road.profiles import RoadParameters, road
@@ -18,8 +19,10 @@ from ..polynomials import Homogeneous
 from ..signals import harmonic
 from ..standard_form import StandardForm
 from .car import discrepancy_order
-from .rows import Evidence, Row
+from .rows import RIGHT, Evidence, Row
 from .system import Array, bump, derived
+
+Complex = NDArray[np.complex128]
 
 SIZES = np.array([0.04, 0.02, 0.01])
 ROAD_11 = 14  # place of h11 in (x, h, ḣ)
@@ -170,7 +173,7 @@ def _parametric() -> Row:
 
 # ------------------------------------------------------------------ modes
 @cache
-def modes() -> tuple[Array, Array]:
+def modes() -> tuple[Complex, Complex]:
     """λ (14), those with β > 0 first and their conjugates in the same order, and K (14, 14)."""
     values, vectors = np.linalg.eig(form().A)
     upper = sorted(np.flatnonzero(values.imag > 0), key=lambda k: values[k].imag)
@@ -186,17 +189,17 @@ def omega() -> float:
 
 
 @cache
-def gains() -> Array:
+def gains() -> Complex:
     """γ_k1 (14): f_k = γ_k1 h11."""
     return np.asarray(np.linalg.solve(modes()[1], form().B[:, 0]))
 
 
-def printed_amplitude(lam: Array, gain: Array, w: float) -> tuple[Array, Array]:
+def printed_amplitude(lam: Complex, gain: Complex, w: float) -> tuple[Complex, Complex]:
     """P_kν over A_ν and ψ_νk as printed below (3.17), with principal branches."""
     return gain / np.sqrt(lam**2 + w**2), np.arctan(w / lam)
 
 
-def _wave_residual(amplitude: Array, phase: Array) -> float:
+def _wave_residual(amplitude: Complex, phase: Complex) -> float:
     """Largest |ξ' − λξ − γ sin Ωt|/|γ| of ξ = P sin(Ωt + ψ) over all modes and times."""
     lam, _ = modes()
     t = np.linspace(0.0, 2.0 * np.pi / omega(), 50)[:, None]
@@ -232,7 +235,7 @@ def _forced() -> Row:
 def _modal_matrix() -> Row:
     lam, K = modes()
 
-    def error(matrix: Array) -> float:
+    def error(matrix: Complex) -> float:
         product = np.linalg.solve(K, form().A @ matrix)
         return float(np.abs(product - np.diag(lam)).max() / np.abs(lam).max())
 
@@ -263,7 +266,7 @@ def _steady() -> Row:
     P, psi = printed_amplitude(lam, gains(), omega())
     as_printed = P[:, None] * np.sin(omega() * t + psi[:, None])
 
-    def error(waves: Array) -> float:
+    def error(waves: Complex) -> float:
         return float(np.abs(waves - truth).max() / np.abs(truth).max())
 
     return Row(
@@ -281,7 +284,7 @@ def _steady() -> Row:
                 apart=1e-6,
             )
         ],
-        misprinted=False,
+        kind=RIGHT,
     )
 
 

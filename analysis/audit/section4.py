@@ -14,13 +14,13 @@ from fmu_src.vehicle.parameters import Car
 
 from ..polynomials import Array
 from .differences import plain
-from .rows import Evidence, Row
+from .rows import RIGHT, Evidence, Row
 from .system import derived as full_car
 
 m, J, a, b, c1, c2, b1, b2 = SYMBOLS = sp.symbols("m J a b c1 c2 b1 b2", positive=True)
 z, phi, dz, dphi = STATE = sp.symbols("z phi dz dphi", real=True)
 u1, u2 = CONTROLS = sp.symbols("u1 u2", real=True)
-zA, zB, dzA, dzB = ROAD = sp.symbols("zA zB dzA dzB", real=True)
+za, zb, dza, dzb = ROAD = sp.symbols("za zb dza dzb", real=True)
 
 A_PRINTED = sp.Matrix([
     [0, 0, 1, 0],
@@ -32,8 +32,8 @@ B_PRINTED = sp.Matrix([[0, 0], [0, 0], [-1 / m, -1 / m], [-1 / J, -1 / J]])
 C_PRINTED = sp.Matrix([
     0,
     0,
-    (c1 * zA + c2 * zB + b1 * dzA + b2 * dzB) / m,
-    (a * c1 * zA - b * c2 * zB + a * b1 * dzA - b * b2 * dzB) / J,
+    (c1 * za + c2 * zb + b1 * dza + b2 * dzb) / m,
+    (a * c1 * za - b * c2 * zb + a * b1 * dza - b * b2 * dzb) / J,
 ])  # fmt: skip
 
 
@@ -42,8 +42,8 @@ def derived() -> tuple[sp.Matrix, sp.Matrix, sp.Matrix]:
     """A, B, C of (4.1) by Lagrange's equations; φ positive front up, u positive down on the body."""
     front, rear = z + a * phi, z - b * phi
     dfront, drear = dz + a * dphi, dz - b * dphi
-    V = (c1 * (front - zA) ** 2 + c2 * (rear - zB) ** 2) / 2
-    R = (b1 * (dfront - dzA) ** 2 + b2 * (drear - dzB) ** 2) / 2
+    V = (c1 * (front - za) ** 2 + c2 * (rear - zb) ** 2) / 2
+    R = (b1 * (dfront - dza) ** 2 + b2 * (drear - dzb) ** 2) / 2
     power = -u1 * dfront - u2 * drear
     forces = [-V.diff(q) - R.diff(v) + power.diff(v) for q, v in ((z, dz), (phi, dphi))]
     rates = sp.Matrix([dz, dphi, forces[0] / m, forces[1] / J])
@@ -195,7 +195,7 @@ def _excitation() -> Row:
                 apart=1.0,
             )
         ],
-        misprinted=False,
+        kind=RIGHT,
     )
 
 
@@ -240,7 +240,7 @@ def _gain() -> Row:
                 apart=1.0,
             ),
         ],
-        misprinted=False,
+        kind=RIGHT,
         note=f"With u = −K x for this K the norm would be {growth(-K):.2g}.",
     )
 

@@ -70,7 +70,9 @@ class System:
         rows = compiled(self.equations, "numpy")(*_numbers(self.car), self.car.m2, *q, *v, *h)
         return np.stack(np.broadcast_arrays(*rows))
 
-    def over_the_bump(self, times: Array, A: float, x0: Array | None = None, rtol: float = 1e-11) -> Array:
+    def over_the_bump(
+        self, times: Array, A: float, x0: Array | None = None, *, rtol: float = 1e-11, method: str = "DOP853"
+    ) -> Array:
         """States (n, 14) at `times` [s] over the default bump, A [m] high; from rest if x0 is not given."""
         values = [*_numbers(self.car), self.car.m2]
         ground, motion = road(bump(self.car, A)), compiled(self.equations, "math")
@@ -80,7 +82,8 @@ class System:
             return [*state[7:], *motion(*values, *state, *ground.heights(t))]
 
         start = np.zeros(14) if x0 is None else x0
-        return in_stretches(rate, ground.corners(times[-1]), start, times, rtol=rtol, atol=1e-3 * rtol * max(A, 1e-6))
+        atol = 1e-3 * rtol * max(A, 1e-6)
+        return in_stretches(rate, ground.corners(times[-1]), start, times, rtol=rtol, atol=atol, method=method)
 
     def linear_over_the_bump(self, times: Array, A: float) -> Array:
         """x_lin (n, 14) of (2.3), in closed form, from rest."""
