@@ -6,14 +6,14 @@ are integers, so that the mean over 2π of every product that occurs is exact to
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import permutations, product
+from itertools import permutations
 
 import numpy as np
 from numpy.typing import NDArray
 
-from . import section3
+from . import modal
 from .rows import Evidence, Row
 
 Complex = NDArray[np.complex128]
@@ -24,7 +24,7 @@ QUIET = ((5, 17), 9)  # β, Ω without any resonance of a cubic system
 
 def rows() -> list[Row]:
     """§3.3 in the order of the paper."""
-    return [_limit(), _pairs(), _A(), _B(), _factor(), _condition(), *_resonances()]
+    return [_limit(), _pairs(), _A(), _B(), _factor(), _condition()]
 
 
 def over_orders(alpha: Complex) -> Complex:
@@ -82,7 +82,7 @@ def textbook(beta: Sequence[int], W: int, seed: int = 2026) -> Textbook:
     K = np.concatenate([half, half.conj()], axis=1)  # of a real system: modes in conjugate pairs
     inverse = np.linalg.inv(K)
     r, b2, b3 = (rng.normal(size=(n,) * k) for k in (4, 2, 3))
-    P, psi = section3.printed_amplitude(np.concatenate([lam, lam.conj()]), inverse @ rng.normal(size=n), W)
+    P, psi = modal.printed_amplitude(np.concatenate([lam, lam.conj()]), inverse @ rng.normal(size=n).astype(complex), W)
     s = rng.normal(size=m) + 1j * rng.normal(size=m)
     return Textbook(
         beta=np.array([*beta, *(-b for b in beta)], dtype=float),
@@ -127,12 +127,12 @@ def pair_sum(x: Textbook, *, halved: bool) -> Complex:
     return terms.sum(axis=1)
 
 
-def _missed(mean: Complex, formula: Complex) -> float:
+def missed(mean: Complex, formula: Complex) -> float:
     """Largest |formula − mean| over largest |mean|."""
     return float(np.abs(formula - mean).max() / np.abs(mean).max())
 
 
-def _still(x: Textbook) -> Textbook:
+def still(x: Textbook) -> Textbook:
     """The same system on a flat road."""
     return Textbook(x.beta, x.W, x.alpha, 0.0 * x.P, x.psi, x.B2, x.B3, x.s)
 
@@ -171,7 +171,7 @@ def _limit() -> Row:
 
 
 def _pairs() -> Row:
-    x = _still(textbook(*QUIET))
+    x = still(textbook(*QUIET))
     mean = x.R_mean()
     return Row(
         equation="(3.20) R̄_i",
@@ -180,8 +180,8 @@ def _pairs() -> Row:
         evidence=[
             _relative(
                 "largest error of the mean by quadrature, system of 2 oscillators on a flat road, ᾱ_iijj+2 read",
-                _missed(mean, x.s * pair_sum(x, halved=False)),
-                _missed(mean, x.s * pair_sum(x, halved=True)),
+                missed(mean, x.s * pair_sum(x, halved=False)),
+                missed(mean, x.s * pair_sum(x, halved=True)),
             )
         ],
     )
@@ -199,8 +199,8 @@ def _A() -> Row:
         evidence=[
             _relative(
                 "largest error of the mean by quadrature, system of 2 oscillators",
-                _missed(mean, x.s * A_printed(x.alpha_bar, x.P)),
-                _missed(mean, x.s * A_corrected(x.alpha_bar, x.P, x.psi)),
+                missed(mean, x.s * A_printed(x.alpha_bar, x.P)),
+                missed(mean, x.s * A_corrected(x.alpha_bar, x.P, x.psi)),
             ),
             _relative(
                 "least error of any A_i of the default car, sine road under the front left wheel",
@@ -213,10 +213,10 @@ def _A() -> Row:
 
 def _car() -> tuple[Complex, Complex, Complex, Complex]:
     """ᾱ, P, ψ of the default car on the default sine road under the front left wheel, and A_i by quadrature."""
-    lam, K = section3.modes()
-    w = section3.omega()
-    P, psi = section3.printed_amplitude(lam, section3.gains(), w)
-    r = section3.autonomous_tensor()
+    lam, K = modal.modes()
+    w = modal.omega()
+    P, psi = modal.printed_amplitude(lam, modal.gains(), w)
+    r = modal.autonomous_tensor()
     alpha = np.einsum("ai,ijkl,jb,kc,ld->abcd", np.linalg.inv(K), r, K, K, K, optimize=True)
     t = np.linspace(0.0, 2.0 * np.pi / w, 32, endpoint=False)
     x = (K @ (P[:, None] * np.sin(w * t + psi[:, None]))).real
@@ -235,8 +235,8 @@ def _B() -> Row:
         evidence=[
             _relative(
                 "largest error of the mean by quadrature, system of 2 oscillators with B_νij and B_νijk",
-                _missed(mean, x.s * B_printed(x)),
-                _missed(mean, x.s * B_corrected(x)),
+                missed(mean, x.s * B_printed(x)),
+                missed(mean, x.s * B_corrected(x)),
             )
         ],
     )
@@ -244,7 +244,7 @@ def _B() -> Row:
 
 def _factor() -> Row:
     epsilon = 0.01
-    x = _still(textbook(*QUIET))
+    x = still(textbook(*QUIET))
     mean, pairs = epsilon * x.R_mean(), pair_sum(x, halved=True)
     return Row(
         equation="amplitude equation after (3.20)",
@@ -253,8 +253,8 @@ def _factor() -> Row:
         evidence=[
             _relative(
                 "largest error of ṡ_k − α_k s_k at ε = 0.01, 2 oscillators on a flat road, sum halved as above",
-                _missed(mean, x.s * pairs),
-                _missed(mean, epsilon * x.s * pairs),
+                missed(mean, x.s * pairs),
+                missed(mean, epsilon * x.s * pairs),
             )
         ],
     )
@@ -278,90 +278,3 @@ def _condition() -> Row:
             )
         ],
     )
-
-
-# ------------------------------------------------------------------ resonances
-Cases = Sequence[tuple[Sequence[int], int]]  # β, Ω (0: flat road)
-Criterion = Callable[[Sequence[int], int], bool]
-
-
-def printed_condition(beta: Sequence[int], W: int) -> bool:
-    """Before (3.20): resonance if β_k = β_l, k ≠ l, or β_k = νΩ (the road has ν = 1 only)."""
-    return len(set(beta)) < len(beta) or W in beta
-
-
-def printed_internal(beta: Sequence[int], _: int) -> bool:
-    """Remark 3.2, of its equalities the imaginary parts: β_j + β_k = β_l or β_j + β_k + β_l = β_m."""
-    sums = {sum(chosen) for count in (2, 3) for chosen in product(beta, repeat=count)}
-    return bool(sums & set(beta))
-
-
-def cubic_condition(beta: Sequence[int], W: int) -> bool:
-    """Resonance if ±ω_1 ± ω_2 ± ω_3 = β_i, each ω a β or the road's (W > 0), but by pairs that cancel."""
-    signed = [sign * b for b in (*beta, *([W] if W else [])) for sign in (1, -1)]
-    for i, target in enumerate(beta):
-        allowed = _cancelling(signed, 2 * i)
-        for places in product(range(len(signed)), repeat=3):
-            if tuple(sorted(places)) not in allowed and sum(signed[k] for k in places) == target:
-                return True
-    return False
-
-
-def _cancelling(signed: Sequence[int], own: int) -> set[tuple[int, ...]]:
-    """The mode itself with any frequency and its opposite."""
-    return {tuple(sorted((own, k, k + 1))) for k in range(0, len(signed), 2)}
-
-
-def is_resonant(beta: Sequence[int], W: int) -> bool:
-    """By quadrature: whether the mean of R_i has more than the corrected (3.20)."""
-    x = textbook(beta, W or 1)
-    x = x if W else _still(x)
-    formula = x.s * (A_corrected(x.alpha_bar, x.P, x.psi) + pair_sum(x, halved=True))
-    return _missed(x.R_mean(), formula) > 1e-9
-
-
-def wrong_verdicts(criterion: Criterion, cases: Cases) -> float:
-    """How many of the cases a criterion judges otherwise than quadrature."""
-    return float(sum(criterion(beta, W) != is_resonant(beta, W) for beta, W in cases))
-
-
-FORCED = [((b1, b2), W) for b1, b2, W in product((3, 4, 5), (7, 9, 11, 15), (2, 5, 7, 9))]
-FREE = [((b1, b2, b3), 0) for b1, b2, b3 in product((3, 4), (5, 6, 7, 8), (9, 10, 12))]
-
-
-def _resonances() -> list[Row]:
-    def row(equation: str, text: str, better: str, criterion: Criterion, cases: Cases) -> Row:
-        example = next(c for c in cases if criterion(*c) != is_resonant(*c))
-        return Row(
-            equation=equation,
-            printed=text,
-            derived=better,
-            evidence=[
-                Evidence(
-                    measure=f"wrong verdicts on {len(cases)} systems, whether (3.20) misses a part of the mean",
-                    printed=wrong_verdicts(criterion, cases),
-                    derived=wrong_verdicts(cubic_condition, cases),
-                    unit="1",
-                    tolerance=0.0,
-                    apart=1.0,
-                )
-            ],
-            note=f"The first: β = {', '.join(map(str, example[0]))}" + (f", Ω = {example[1]}." if example[1] else "."),
-        )
-
-    return [
-        row(
-            "no-resonance condition before (3.20)",
-            "β_k ≠ β_l, β_k ≠ νΩ",
-            "no β_i = ±ω_1 ± ω_2 ± ω_3, each ω a β_j or a νΩ, but by pairs that cancel (so β_i ± β_j ≠ (μ ± ν)Ω too)",
-            printed_condition,
-            FORCED,
-        ),
-        row(
-            "remark 3.2",
-            "λ_j + λ_k − λ_l = 0, λ_j + λ_k + λ_l − λ_m = 0",
-            "in an odd system β_j + β_k + β_l = β_m and β_j + β_k = β_l + β_m but by equal pairs; never the first",
-            printed_internal,
-            FREE,
-        ),
-    ]

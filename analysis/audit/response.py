@@ -16,8 +16,7 @@ from fmu_src.vehicle.parameters import Car
 
 from ..derivation import derive
 from . import printed_car
-from .car import CONVENTION
-from .differences import derived_equations
+from .differences import CONVENTION, derived_equations
 from .rows import REFUTED, Evidence, Row
 from .system import SMALL, Array, System, bump, derived, energy, printed
 
@@ -26,7 +25,7 @@ TIMES = np.linspace(0.0, 6.0, 1201)  # s
 LONG = 60.0  # s
 CARS, SPREAD = 15, 0.3  # besides the default car; each parameter within ± SPREAD of its default, evenly
 HEIGHTS = (1.0, 10.0)  # of the bump, over HEIGHT
-STARTS = 200
+STARTS = 100
 
 
 # ------------------------------------------------------------------ what the misprints do to the response

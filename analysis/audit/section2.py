@@ -1,8 +1,4 @@
-"""§2: evidence on (2.5), definition 2.1 and the averaging of (2.7), on an oscillator that can be done by hand.
-
-The oscillator: x'' + x = F sin Ωt − ε x³, state (x, x'). It is undamped, so that its X(t), a rotation, keeps (2.10)
-finite, and with Ω = 2 no combination of frequencies but the intended one is slow; everything repeats after 2π.
-"""
+"""§2: evidence on (2.5), definition 2.1 and the averaging of (2.7), on an oscillator that can be done by hand."""
 
 from __future__ import annotations
 
@@ -12,14 +8,11 @@ import numpy as np
 from scipy.integrate import quad, solve_ivp
 
 from .car import CROSSING
+from .oscillator import ONE_PERIOD, START, Force, P, S, S_printed, flow, mean, pulled_back, turned, w
 from .rows import Evidence, Row
 from .system import Array, derived
 
-OMEGA, P = 2.0, 0.7  # forcing frequency; x_lin = P sin Ωt, so F = P (1 − Ω²)
-ONE_PERIOD = np.linspace(0.0, 2.0 * np.pi, 512, endpoint=False)  # a mean over these is exact for trigonometric sums
-START = np.array([1.0, 0.2])  # ζ at the start
 EPSILONS = np.array([0.04, 0.02, 0.01])
-Force = Callable[[Array, Array], Array]
 
 
 def rows() -> list[Row]:
@@ -27,51 +20,6 @@ def rows() -> list[Row]:
     return [_arbitrary_motion(), _definition(), _averaged(), _damped(), _w(), _remainder(), _rest()]
 
 
-def X(t: Array) -> Array:
-    """Fundamental matrices (…, 2, 2) of x'' + x = 0."""
-    return np.moveaxis(np.array([[np.cos(t), np.sin(t)], [-np.sin(t), np.cos(t)]]), (0, 1), (-2, -1))
-
-
-def x_lin(t: Array) -> Array:
-    """(…, 2)."""
-    return np.stack([P * np.sin(OMEGA * t), P * OMEGA * np.cos(OMEGA * t)], axis=-1)
-
-
-def Phi(x: Array) -> Array:
-    """(0, −x³)."""
-    return np.stack([np.zeros_like(x[..., 0]), -(x[..., 0] ** 3)], axis=-1)
-
-
-def _turned(t: Array, v: Array) -> Array:
-    return np.einsum("...ij,...j->...i", X(t), v)
-
-
-def S(t: Array, zeta: Array) -> Array:
-    """S(t, ζ) as defined below (2.7): Φ[t, x_lin + X ζ]."""
-    return Phi(x_lin(t) + _turned(t, zeta))
-
-
-def S_printed(t: Array, v: Array) -> Array:
-    """What (2.10) averages: Φ[t, X v]."""
-    return Phi(_turned(t, v))
-
-
-def pulled_back(force: Force) -> Force:
-    """X⁻¹ times the force."""
-    return lambda t, v: np.einsum("...ji,...j->...i", X(t), force(t, v))
-
-
-def mean(force: Force, v: Array) -> Array:
-    """(2.10): the mean of X⁻¹ force over explicit time."""
-    return np.mean(pulled_back(force)(ONE_PERIOD, np.broadcast_to(v, (len(ONE_PERIOD), 2))), axis=0)
-
-
-def flow(rate: Callable[[float, Array], Array], end: float) -> Array:
-    """v(end) (2) from START."""
-    return np.asarray(solve_ivp(rate, (0.0, end), START, method="DOP853", rtol=1e-11, atol=1e-13).y[:, -1])
-
-
-# ------------------------------------------------------------------ rows
 def _arbitrary_motion() -> Row:
     """On x' = −x, x̂0 = 1."""
     return Row(
@@ -201,16 +149,9 @@ def _damped() -> Row:
     )
 
 
-def w(force: Force, S_1: Force, v: Array, T: float) -> Array:
-    """(2.12): the integral over time from 0 to T of X⁻¹ force − S_1, at fixed v (2)."""
-    t = np.linspace(0.0, T, round(512 * T / (2.0 * np.pi)) + 1)
-    values = pulled_back(force)(t, np.broadcast_to(v, (len(t), 2))) - S_1(t, v)
-    return np.asarray(np.trapezoid(values, t, axis=0))
-
-
 def _w() -> Row:
     """S already holds X: with S[τ, X v] it comes in twice, and another mean is taken out than there is."""
-    doubled: Force = lambda t, v: S(t, _turned(t, v))  # noqa: E731
+    doubled: Force = lambda t, v: S(t, turned(t, v))  # noqa: E731
     S_1: Force = lambda t, v: mean(S, v)  # noqa: E731
     T = 2.0 * np.pi * 100
     return Row(
@@ -248,7 +189,7 @@ def _right_side(t: float, v: Array, epsilon: float) -> tuple[Array, Array, Array
     by_zeta = _derivative(lambda at: pulled(np.asarray(t), at), v)
     change = pulled(np.asarray(t), v + epsilon * w_there) - pulled(np.asarray(t), v)
     slope = mean(S, v)
-    exact: Array = np.linalg.solve(np.eye(2) + epsilon * w_v, epsilon * (slope + change))
+    exact = np.asarray(np.linalg.solve(np.eye(2) + epsilon * w_v, epsilon * (slope + change)), dtype=float)
     as_printed = epsilon * slope - epsilon * w_v @ (epsilon * slope)
     return exact, as_printed, as_printed + epsilon**2 * by_zeta @ w_there
 

@@ -1,59 +1,35 @@
-"""§3.2, (3.17) and §3.4: evidence on the quasi-linear equations and the linear response of the default car."""
+"""§3.2 and §3.4: evidence on the quasi-linear equations of the default car, and on its road."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import cache
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fmu_src.quantities import PARAMETERS
-from fmu_src.road.profiles import RoadParameters, road
+from fmu_src.road.profiles import road
 from fmu_src.vehicle.parameters import Car
 
-from ..car import car_form
 from ..derivation import COORDINATES
-from ..linear_response import periodic_response
+from ..figures import readable
 from ..polynomials import Homogeneous
-from ..signals import harmonic
-from ..standard_form import StandardForm
+from . import modal
 from .car import discrepancy_order
-from .rows import RIGHT, Evidence, Row
+from .modal import ROAD_11, cubic_part, form
+from .rows import Evidence, Row
 from .system import Array, bump, derived
 
-Complex = NDArray[np.complex128]
-
 SIZES = np.array([0.04, 0.02, 0.01])
-ROAD_11 = 14  # place of h11 in (x, h, ḣ)
 
 
 def rows() -> list[Row]:
     """§3.2 to §3.4 but for the averaging, in the order of the paper."""
-    return [_autonomous(), _stiffness(), _parametric(), _forced(), _modal_matrix(), _steady(), _parameter(), _delay()]
-
-
-@cache
-def form() -> StandardForm:
-    """The default car, expanded to degree 3."""
-    return car_form(Car(), order=3)
-
-
-def _cubic() -> Homogeneous:
-    (part,) = (part for parts in form().terms.values() for part in parts if part.degree == 3)
-    return part
-
-
-def autonomous_tensor() -> Array:
-    """r_ijkl (14, 14, 14, 14), symmetric in j, k, l: R̄ with the cubic stiffness, as x' has it."""
-    part = _cubic()
-    own = (part.monomials < ROAD_11).all(axis=1)
-    return Homogeneous(part.monomials[own], part.coefficients[:, own]).tensor(14)
+    return [_autonomous(), _stiffness(), _parametric(), *modal.rows(), _parameter(), _delay()]
 
 
 def _restricted(rates: int) -> Homogeneous:
     """The terms of degree 3 in q and q̇ alone, with this many factors q̇."""
-    part = _cubic()
+    part = cubic_part()
     own = (part.monomials < ROAD_11).all(axis=1) & ((part.monomials >= 7).sum(axis=1) == rates)
     return Homogeneous(part.monomials[own], part.coefficients[:, own])
 
@@ -110,7 +86,7 @@ def _stiffness() -> Row:
     x = derived("A").over_the_bump(times, PARAMETERS["A"].start).T
     values = [part(x) for part in (stiffness, damping, inertia)]
     sizes = [np.linalg.norm(value, axis=0).max() for value in values]
-    whole = _cubic()(np.concatenate([x, np.zeros((8, x.shape[1]))]))
+    whole = cubic_part()(np.concatenate([x, np.zeros((8, x.shape[1]))]))
     left_out = [np.linalg.norm(whole - sum(kept), axis=0).max() / sum(sizes) for kept in (values[1:], values)]
     return Row(
         equation="C̄_i, R̄_i",
@@ -137,18 +113,23 @@ def parametric_terms() -> list[tuple[int, tuple[int, ...], float]]:
     return [(i, m, c) for i, m, c in found if min(m) < ROAD_11 <= max(m)]
 
 
+def _by_road(monomial: tuple[int, ...]) -> tuple[int, ...]:
+    """The same variables, the road's first."""
+    return tuple(sorted(monomial, key=lambda place: (place < ROAD_11, place)))
+
+
 def _parametric() -> Row:
     terms = parametric_terms()
-    wheels = ("h11", "h12", "h21", "h22")
     named = [
-        f"{c:.4g} {wheels[m[-1] - ROAD_11]} {' '.join(COORDINATES[j].replace('psi', 'ψ') for j in m[:-1])}"
-        for _, m, c in terms
+        f"d_{i - 6}{m[0] - 13}{m[1] + 1}{m[2] + 1} = {readable(c)}"
+        for i, m, c in ((i, _by_road(m), c) for i, m, c in terms)
     ]
     own = {COORDINATES[i - 7].replace("psi", "ψ") for i, _, _ in terms}
     return Row(
         equation="P_i(t, ξ), B_νij, B_νijk",
         printed="ε Σ B_νij ξ_j sin νΩt + ε Σ B_νijk ξ_j ξ_k sin νΩt for the front left wheel",
-        derived=f"only h q q, only in the row of {', '.join(sorted(own))}: {'; '.join(named)}; for a front wheel P = 0",
+        derived=f"only h q q, only in the row of {', '.join(sorted(own))}: {', '.join(named)} 1/(m s²); for a front "
+        "wheel P = 0",
         evidence=[
             Evidence(
                 measure="terms h·q, linear in the coordinates, that the print has and the car has",
@@ -171,124 +152,6 @@ def _parametric() -> Row:
     )
 
 
-# ------------------------------------------------------------------ modes
-@cache
-def modes() -> tuple[Complex, Complex]:
-    """λ (14), those with β > 0 first and their conjugates in the same order, and K (14, 14)."""
-    values, vectors = np.linalg.eig(form().A)
-    upper = sorted(np.flatnonzero(values.imag > 0), key=lambda k: values[k].imag)
-    return (
-        np.concatenate([values[upper], values[upper].conj()]),
-        np.concatenate([vectors[:, upper], vectors[:, upper].conj()], axis=1),
-    )
-
-
-def omega() -> float:
-    """Ω of the default road [rad/s]."""
-    return RoadParameters().omega
-
-
-@cache
-def gains() -> Complex:
-    """γ_k1 (14): f_k = γ_k1 h11."""
-    return np.asarray(np.linalg.solve(modes()[1], form().B[:, 0]))
-
-
-def printed_amplitude(lam: Complex, gain: Complex, w: float) -> tuple[Complex, Complex]:
-    """P_kν over A_ν and ψ_νk as printed below (3.17), with principal branches."""
-    return gain / np.sqrt(lam**2 + w**2), np.arctan(w / lam)
-
-
-def _wave_residual(amplitude: Complex, phase: Complex) -> float:
-    """Largest |ξ' − λξ − γ sin Ωt|/|γ| of ξ = P sin(Ωt + ψ) over all modes and times."""
-    lam, _ = modes()
-    t = np.linspace(0.0, 2.0 * np.pi / omega(), 50)[:, None]
-    angle = omega() * t + phase
-    left = amplitude * (omega() * np.cos(angle) - lam * np.sin(angle)) - gains() * np.sin(omega() * t)
-    return float((np.abs(left) / np.abs(gains())).max())
-
-
-def _forced() -> Row:
-    """Homogeneous ξ, which K⁻¹ (3.11) gives, and forced ξ, put into (3.13)."""
-    lam, _ = modes()
-    P, psi = printed_amplitude(lam, gains(), omega())
-    t = 0.25 * 2.0 * np.pi / omega()  # f is largest
-    free = np.exp(lam * t)
-    left = np.abs(lam * free - lam * free - gains() * np.sin(omega() * t)) / np.abs(gains())
-    return Row(
-        equation="(3.13)",
-        printed="ξ of free vibrations, superscript (h), by K⁻¹ times (3.11)",
-        derived="ξ of forced vibrations, by K⁻¹ times the linear part of (3.10)",
-        evidence=[
-            Evidence(
-                measure="|ξ' − Λξ − f(t)| over |f|, sine road under the front left wheel",
-                printed=float(left.max()),
-                derived=_wave_residual(P, psi),
-                unit="1",
-                tolerance=1e-10,
-                apart=0.5,
-            )
-        ],
-    )
-
-
-def _modal_matrix() -> Row:
-    lam, K = modes()
-
-    def error(matrix: Complex) -> float:
-        product = np.linalg.solve(K, form().A @ matrix)
-        return float(np.abs(product - np.diag(lam)).max() / np.abs(lam).max())
-
-    return Row(
-        equation="after (3.14)",
-        printed="K_i^(j) the i-th column and the j-th row element of K",
-        derived="i-th row and j-th column: the j-th mode's i-th state",
-        evidence=[
-            Evidence(
-                measure="largest |K⁻¹ A K − Λ| over largest |λ|, K's elements read in both ways",
-                printed=error(K.T),
-                derived=error(K),
-                unit="1",
-                tolerance=1e-10,
-                apart=0.1,
-            )
-        ],
-    )
-
-
-def _steady() -> Row:
-    lam, K = modes()
-    t = np.linspace(0.0, 2.0 * np.pi / omega(), 50)
-    front_left = harmonic([-1j], omega())  # sin Ωt
-    truth = np.linalg.solve(K, periodic_response(form().A, form().B[:, :1], front_left.pieces[0], t))
-    there, back = gains() / (1j * omega() - lam), gains() / (-1j * omega() - lam)
-    by_hand = (np.outer(there, np.exp(1j * omega() * t)) - np.outer(back, np.exp(-1j * omega() * t))) / 2j
-    P, psi = printed_amplitude(lam, gains(), omega())
-    as_printed = P[:, None] * np.sin(omega() * t + psi[:, None])
-
-    def error(waves: Complex) -> float:
-        return float(np.abs(waves - truth).max() / np.abs(truth).max())
-
-    return Row(
-        equation="(3.17)",
-        printed="P_kν = γ_k1 A_ν/√(λ_k² + ν²Ω²), ψ_νk = arctan(νΩ/λ_k)",
-        derived="the same, with principal branches and Re λ_k < 0",
-        evidence=[
-            Evidence(
-                measure="largest error of ξ_k against the periodic motion of the 14 states, over largest |ξ|: by "
-                "(3.17), and by exponentials",
-                printed=error(as_printed),
-                derived=error(by_hand),
-                unit="1",
-                tolerance=1e-12,
-                apart=1e-6,
-            )
-        ],
-        kind=RIGHT,
-    )
-
-
-# ------------------------------------------------------------------ §3.4
 def _parameter() -> Row:
     return Row(
         equation="§3.4, ε = 0.01",

@@ -44,7 +44,7 @@ class Linear:
         return np.block([[np.zeros((7, 8))], [self.P / self.M[:, None], np.zeros((7, 4))]])
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True)  # no slots: `linear` is kept
 class System:
     """Left sides of seven equations of motion, in the coordinates of a convention, for one car; m_z is taken as m2."""
 
@@ -59,11 +59,12 @@ class System:
 
     @cached_property
     def linear(self) -> Linear:
-        d = derive()
-        values = dict(zip([*d.parameters, printed_car.m_z], [*_numbers(self.car), self.car.m2], strict=True))
-        blocks = [_at_rest(self.equations, tuple(vector)) for vector in (d.a, d.v, d.q, d.h)]
-        M, D, K, P = (np.array(block.xreplace(values).tolist(), dtype=float) for block in blocks)
-        return Linear(M.diagonal(), D, K, -P)
+        """By complex steps, which are exact."""
+        M = np.array(compiled_masses(self.equations)(*_numbers(self.car), self.car.m2), dtype=float)
+        q, v, h = np.split(1e-30j * np.eye(18), [7, 14])
+        slopes = M[:, None] * np.imag(self.accelerations(q, v, h)) / 1e-30
+        K, D, P = np.split(slopes, [7, 14], axis=1)
+        return Linear(M, -D, -K, P)
 
     def accelerations(self, q: Any, v: Any, h: Any) -> Array:
         """q̈ (7, …) at q, v (7, …) and h (4, …)."""
@@ -120,8 +121,10 @@ def _numbers(car: Car) -> list[float]:
 
 
 @cache
-def _at_rest(equations: sp.ImmutableMatrix, by: tuple[sp.Symbol, ...]) -> sp.Matrix:
-    return equations.jacobian(sp.Matrix(by)).xreplace(SMALL)
+def compiled_masses(equations: sp.ImmutableMatrix) -> Any:
+    """Function (parameters, m_z) -> coefficients (7) of each equation's own acceleration at rest."""
+    masses = [equation.diff(a).xreplace(SMALL) for equation, a in zip(equations, derive().a, strict=True)]
+    return sp.lambdify([*derive().parameters, printed_car.m_z], masses)
 
 
 @cache
