@@ -96,6 +96,7 @@ def rows() -> list[Row]:
                     f"of these {CARS + 1} cars, those for which V is not strictly convex in y",
                     *(float(np.sum(curvatures <= 0.0)) for _ in names),
                 ),
+                _both("(det ∂y/∂q)² over (cos ψ cos² φ cos ψ2)², less 1, by algebra", jacobian_off(), jacobian_off()),
                 _both(
                     f"other equilibria with |angles| < π/2 that a root search from {STARTS} starts finds",
                     *(float(others[name]) for name in names),
@@ -159,16 +160,27 @@ def growth_rates(name: str) -> Array:
     return np.array([np.linalg.eigvals(_system(name, car).linear.A).real.max() for car in cars()])
 
 
+def _y() -> sp.Matrix:
+    """y = (z, sin ψ cos φ, sin φ, z11, z12, z2, sin ψ2), in which V is quadratic."""
+    z, psi, phi, z11, z12, z2, psi2 = derive().q
+    return sp.Matrix([z, sp.sin(psi) * sp.cos(phi), sp.sin(phi), z11, z12, z2, sp.sin(psi2)])
+
+
 def statics_that_differ(name: str) -> int:
     """Equations that at rest on a flat road are not the gradient of V = ½ yᵀ K y, by algebra."""
-    d = derive()
+    d, y = derive(), _y()
     own = sp.Matrix(printed_car.EQUATIONS if name == "printed" else derived_equations(CONVENTION))
-    z, psi, phi, z11, z12, z2, psi2 = d.q
-    y = sp.Matrix([z, sp.sin(psi) * sp.cos(phi), sp.sin(phi), z11, z12, z2, sp.sin(psi2)])
     K = derived_equations(CONVENTION).jacobian(d.q).xreplace(SMALL)
     still = dict.fromkeys([*d.v, *d.a, *d.h], sp.S.Zero)
     off = own.xreplace(still) - y.jacobian(d.q).T * K * y
     return sum(sp.trigsimp(sp.expand(term)) != 0 for term in off)
+
+
+def jacobian_off() -> float:
+    """(det ∂y/∂q)² over (cos ψ cos² φ cos ψ2)², less 1, by algebra."""
+    _, psi, phi, *_, psi2 = derive().q
+    claimed = sp.cos(psi) * sp.cos(phi) ** 2 * sp.cos(psi2)
+    return float(sp.simplify(_y().jacobian(derive().q).det() ** 2 / claimed**2) - 1)
 
 
 def least_curvature(car: Car) -> float:
