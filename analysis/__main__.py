@@ -153,6 +153,8 @@ def _report(options: argparse.Namespace) -> int:
 def _audit(options: argparse.Namespace) -> int:
     from .audit.document import audit, text, write
 
+    if options.out and options.out.exists() and not options.out.is_dir():
+        raise InputError(f"{options.out}: wanted a folder, got a file; name another with -o")
     result = audit(progress=True)
     print(text(result))
     if options.out:

@@ -103,6 +103,10 @@ def test_the_command_writes_its_files_and_fails_if_a_number_does_not_decide(
     stored = json.loads((tmp_path / "new" / "folder" / "audit.json").read_text(encoding="utf-8"))
     assert [row["verdict"] for row in stored["rows"]] == [row.verdict for row in result.rows]
 
+    (tmp_path / "file").write_text("")
+    assert run(result, "-o", str(tmp_path / "file")) == 2
+    assert "wanted a folder, got a file" in capsys.readouterr().err
+
     first = result.rows[0]
     spoilt = replace(first, evidence=[replace(first.evidence[0], derived=math.nan)])
     assert run(replace(result, rows=(spoilt, *result.rows[1:]))) == 1

@@ -82,9 +82,12 @@ def as_json(result: Audit) -> dict[str, Any]:
 
 
 # ------------------------------------------------------------------ words
+NOISE = 1e-5  # numbers that are only known to be below a tolerance as small as this are written so
+
+
 def shown(e: Evidence, value: float) -> str:
-    """A number to three digits, a count in full; what is zero within its tolerance, as below it."""
-    if e.expected == 0.0 and e.tolerance > 0.0 and abs(value) <= e.tolerance:
+    """A number to three digits, a count in full; round-off, as below its tolerance."""
+    if e.expected == 0.0 and abs(value) <= e.tolerance and 0.0 < e.tolerance < NOISE:
         return f"< {e.tolerance:g}".replace("-", "−")
     return readable(value, 6 if value.is_integer() else 3)
 

@@ -236,7 +236,7 @@ def _gain() -> Row:
                 printed=growth(K),
                 derived=growth(K_elsewhere),
                 unit="1",
-                tolerance=1e-3,
+                tolerance=1e-6,
                 apart=1.0,
             ),
         ],
