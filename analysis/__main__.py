@@ -63,6 +63,10 @@ def _parser() -> argparse.ArgumentParser:
     verb = verbs.add_parser("report", help="draw the figures of a run and write its report.html")
     verb.add_argument("run", type=Path, metavar="RUN", help="run folder")
     verb.set_defaults(do=_report)
+
+    verb = verbs.add_parser("audit", help="audit the equations and claims of the paper; needs no run")
+    verb.add_argument("-o", "--out", type=Path, metavar="DIR", help="also write audit.md, audit.json and figures there")
+    verb.set_defaults(do=_audit)
     return parser
 
 
@@ -144,6 +148,19 @@ def _report(options: argparse.Namespace) -> int:
 
     print(f"{write_report(options.run)}: written")
     return 0
+
+
+def _audit(options: argparse.Namespace) -> int:
+    from .audit.document import audit, text, write
+
+    if options.out and options.out.exists() and not options.out.is_dir():
+        raise InputError(f"{options.out}: wanted a folder, got a file; name another with -o")
+    result = audit(progress=True)
+    print(text(result))
+    if options.out:
+        for path in write(result, options.out):
+            print(f"{path}: written")
+    return 0 if result.holds else 1
 
 
 def _leave(status: int) -> NoReturn:

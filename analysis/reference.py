@@ -9,6 +9,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import fields
 from functools import cache
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 from scipy.integrate import solve_ivp
@@ -109,22 +110,44 @@ def integrate(
 ) -> Array:
     """States (n, 14) at `times` (n,), from x0 at times[0], under forces(t, x) [N] that jump only at `switches` [s]."""
     ground, motion = road_of(parameters), equations_of_motion(car_of(parameters))
-    inner = (t for t in {*ground.corners(times[-1]), *switches} if times[0] + NUDGE < t < times[-1] - NUDGE)
+
+    def rate(t: float, y: Array) -> list[float]:
+        state = y.tolist()
+        q, v = state[:7], state[7:]
+        accelerations, _, _ = motion(q, v, forces(t, state), ground.heights(t), ground.rates(t))
+        return [*v, *accelerations]
+
+    return in_stretches(rate, [*ground.corners(times[-1]), *switches], x0, times, rtol=rtol)
+
+
+def in_stretches(
+    rate: Callable[[float, Array], Sequence[float] | Array],
+    corners: Sequence[float],
+    x0: Array,
+    times: Array,
+    *,
+    rtol: float = 1e-12,
+    atol: float | None = None,
+    method: str = "DOP853",
+) -> Array:
+    """States (n, len(x0)) at `times` (n,) [s] of x' = rate(t, x) from x0 at times[0], restarted at each corner [s].
+
+    The rate is asked for times a little inside each stretch, where it has not jumped. Raises InputError where the
+    integration does not come to its end.
+    """
+    inner = (t for t in {*corners} if times[0] + NUDGE < t < times[-1] - NUDGE)
     edges = [times[0], *sorted(inner), times[-1]]
     states = np.empty((len(times), len(x0)))
     states[0] = x = x0
+    tolerances = {"rtol": rtol, "atol": rtol * 1e-3 if atol is None else atol}
     for begin, end in pairwise(edges):
 
-        def rate(t: float, y: Array, first: float = begin + NUDGE, last: float = end - NUDGE) -> list[float]:
-            t = min(max(t, first), last)
-            state = y.tolist()
-            q, v = state[:7], state[7:]
-            accelerations, _, _ = motion(q, v, forces(t, state), ground.heights(t), ground.rates(t))
-            return [*v, *accelerations]
+        def inside(t: float, y: Array, first: float = begin + NUDGE, last: float = end - NUDGE) -> Any:
+            return rate(min(max(t, first), last), y)
 
         within = (times > begin) & (times <= end)
         sampled = np.union1d(times[within], end)
-        solution = solve_ivp(rate, (begin, end), x, method="DOP853", rtol=rtol, atol=rtol * 1e-3, t_eval=sampled)
+        solution = solve_ivp(inside, (begin, end), x, method=method, t_eval=sampled, **tolerances)
         if not solution.success:
             raise InputError(f"from t = {begin:g} s the motion cannot be integrated: {solution.message}")
         states[within], x = solution.y.T[: np.count_nonzero(within)], solution.y[:, -1]

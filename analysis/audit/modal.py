@@ -1,0 +1,161 @@
+"""The default car in the form and in the modes of §3.2; evidence on (3.13) to (3.17)."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fmu_src.road.profiles import RoadParameters
+from fmu_src.vehicle.parameters import Car
+
+from ..car import car_form
+from ..linear_response import periodic_response
+from ..polynomials import Array, Homogeneous
+from ..signals import harmonic
+from ..standard_form import StandardForm
+from .rows import RIGHT, Evidence, Row
+
+Complex = NDArray[np.complex128]
+ROAD_11 = 14  # place of h11 in (x, h, ḣ)
+
+
+def rows() -> list[Row]:
+    """(3.13) to (3.17)."""
+    return [_forced(), _modal_matrix(), _steady()]
+
+
+@cache
+def form() -> StandardForm:
+    """The default car, expanded to degree 3."""
+    return car_form(Car(), order=3)
+
+
+def cubic_part() -> Homogeneous:
+    """The terms of degree 3 in (x, h, ḣ)."""
+    (part,) = (part for parts in form().terms.values() for part in parts if part.degree == 3)
+    return part
+
+
+def autonomous_tensor() -> Array:
+    """r_ijkl (14, 14, 14, 14), symmetric in j, k, l: R̄ with the cubic stiffness, as x' has it."""
+    part = cubic_part()
+    own = (part.monomials < ROAD_11).all(axis=1)
+    return Homogeneous(part.monomials[own], part.coefficients[:, own]).tensor(14)
+
+
+@cache
+def modes() -> tuple[Complex, Complex]:
+    """λ (14), those with β > 0 first and their conjugates in the same order, and K (14, 14)."""
+    values, vectors = np.linalg.eig(form().A)
+    upper = sorted(np.flatnonzero(values.imag > 0), key=lambda k: values[k].imag)
+    return (
+        np.concatenate([values[upper], values[upper].conj()]),
+        np.concatenate([vectors[:, upper], vectors[:, upper].conj()], axis=1),
+    )
+
+
+def omega() -> float:
+    """Ω of the default road [rad/s]."""
+    return RoadParameters().omega
+
+
+@cache
+def gains() -> Complex:
+    """γ_k1 (14): f_k = γ_k1 h11."""
+    return np.asarray(np.linalg.solve(modes()[1], form().B[:, 0]))
+
+
+def printed_amplitude(lam: Complex, gain: Complex, w: float) -> tuple[Complex, Complex]:
+    """P_kν over A_ν and ψ_νk as printed below (3.17), with principal branches."""
+    return gain / np.sqrt(lam**2 + w**2), np.arctan(w / lam)
+
+
+def _wave_residual(amplitude: Complex, phase: Complex) -> float:
+    """Largest |ξ' − λξ − γ sin Ωt|/|γ| of ξ = P sin(Ωt + ψ) over all modes and times."""
+    lam, _ = modes()
+    t = np.linspace(0.0, 2.0 * np.pi / omega(), 50)[:, None]
+    angle = omega() * t + phase
+    left = amplitude * (omega() * np.cos(angle) - lam * np.sin(angle)) - gains() * np.sin(omega() * t)
+    return float((np.abs(left) / np.abs(gains())).max())
+
+
+def _forced() -> Row:
+    """Homogeneous ξ, which K⁻¹ (3.11) gives, and forced ξ, put into (3.13)."""
+    lam, _ = modes()
+    P, psi = printed_amplitude(lam, gains(), omega())
+    t = 0.25 * 2.0 * np.pi / omega()  # f is largest
+    free = np.exp(lam * t)
+    left = np.abs(lam * free - lam * free - gains() * np.sin(omega() * t)) / np.abs(gains())
+    return Row(
+        equation="(3.13)",
+        printed="ξ of free vibrations, superscript (h), by K⁻¹ times (3.11)",
+        derived="ξ of forced vibrations, by K⁻¹ times the linear part of (3.10)",
+        evidence=[
+            Evidence(
+                measure="|ξ' − Λξ − f(t)| over |f|, sine road under the front left wheel",
+                printed=float(left.max()),
+                derived=_wave_residual(P, psi),
+                unit="1",
+                tolerance=1e-10,
+                apart=0.5,
+            )
+        ],
+    )
+
+
+def _modal_matrix() -> Row:
+    lam, K = modes()
+
+    def error(matrix: Complex) -> float:
+        product = np.linalg.solve(K, form().A @ matrix)
+        return float(np.abs(product - np.diag(lam)).max() / np.abs(lam).max())
+
+    return Row(
+        equation="after (3.14)",
+        printed="K_i^(j) the i-th column and the j-th row element of K",
+        derived="i-th row and j-th column: the j-th mode's i-th state",
+        evidence=[
+            Evidence(
+                measure="largest |K⁻¹ A K − Λ| over largest |λ|, K's elements read in both ways",
+                printed=error(K.T),
+                derived=error(K),
+                unit="1",
+                tolerance=1e-10,
+                apart=0.1,
+            )
+        ],
+    )
+
+
+def _steady() -> Row:
+    lam, K = modes()
+    t = np.linspace(0.0, 2.0 * np.pi / omega(), 50)
+    front_left = harmonic([-1j], omega())  # sin Ωt
+    truth = np.linalg.solve(K, periodic_response(form().A, form().B[:, :1], front_left.pieces[0], t))
+    there, back = gains() / (1j * omega() - lam), gains() / (-1j * omega() - lam)
+    by_hand = (np.outer(there, np.exp(1j * omega() * t)) - np.outer(back, np.exp(-1j * omega() * t))) / 2j
+    P, psi = printed_amplitude(lam, gains(), omega())
+    as_printed = P[:, None] * np.sin(omega() * t + psi[:, None])
+
+    def error(waves: Complex) -> float:
+        return float(np.abs(waves - truth).max() / np.abs(truth).max())
+
+    return Row(
+        equation="(3.17)",
+        printed="P_kν = γ_k1 A_ν/√(λ_k² + ν²Ω²), ψ_νk = arctan(νΩ/λ_k)",
+        derived="the same, with principal branches and Re λ_k < 0",
+        evidence=[
+            Evidence(
+                measure="largest error of ξ_k against the periodic motion of the 14 states, over largest |ξ|: by "
+                "(3.17), and by exponentials",
+                printed=error(as_printed),
+                derived=error(by_hand),
+                unit="1",
+                tolerance=1e-12,
+                apart=1e-6,
+            )
+        ],
+        kind=RIGHT,
+    )

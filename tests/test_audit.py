@@ -1,0 +1,221 @@
+"""The audit: every row decided by its numbers, some of them by a second way, and the page of the docs that it wrote."""
+
+from __future__ import annotations
+
+import json
+import math
+import re
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from analysis import __main__ as command_line
+from analysis.audit import averaging, car, document, resonance, response, rows, section2
+from analysis.audit.differences import CONVENTION, differences
+from analysis.audit.document import Audit
+from analysis.audit.rows import MISPRINT, REFUTED, RIGHT, Evidence, Row
+from analysis.audit.system import derived, planted, printed
+
+DOCS = Path(__file__).resolve().parents[1] / "docs"
+SEVEN = ["(3.2)", "(3.3)", "(3.4)", "(3.5)", "(3.6)", "(3.7)"]  # each once in convention B
+EXPECTED = {
+    MISPRINT: [
+        *["(2.5)", "definition 2.1", "(2.10)", "(2.10) with assumption 1", "(2.12) and below it", "(2.13)"],
+        *["after (2.14)", "e = R i", *SEVEN, "(3.1)–(3.7)", "list after (3.7)", "(3.4), (3.7)"],
+        *["R̄_i", "C̄_i, R̄_i", "P_i(t, ξ), B_νij, B_νijk", "(3.13)", "after (3.14)", "§3.4, ε = 0.01", "§3.4, h12, h22"],
+        *["before (3.20), (3.20)", "(3.20) R̄_i", "(3.20) A_i", "(3.20) B_i", "amplitude equation after (3.20)"],
+        *["condition after (3.20)", "no-resonance condition before (3.20)", "remark 3.2"],
+        *["(4.1) A", "(4.1) B", "§4, c1, c2, b1, b2", "§4, φ"],
+    ],
+    RIGHT: ["(3.1)–(3.7)", "(3.1)–(3.7)", "(3.8)", "(3.17)", "(4.1) C", "remark 4.1"],
+    REFUTED: ["§3.4, figures 3, 4"],
+}
+
+
+@pytest.fixture(scope="module")  # the tests that ask for it stand together, so that one worker runs them
+def result() -> Audit:
+    return document.audit()
+
+
+def test_every_row_is_decided_by_every_number_of_its_own(result: Audit) -> None:
+    for kind, equations in EXPECTED.items():
+        assert [row.equation for row in result.rows if row.verdict == kind] == equations
+    assert len(result.rows) == sum(map(len, EXPECTED.values()))
+    for row in (*result.rows, *result.in_a):
+        assert row.evidence, row.equation
+        for e in row.evidence:
+            off, derived_off = abs(e.printed - e.expected), abs(e.derived - e.expected)
+            assert derived_off <= e.tolerance <= e.apart, (row.equation, e.measure, e.derived)
+            assert off >= e.apart if row.kind == MISPRINT else off <= e.tolerance, (row.equation, e.measure, e.printed)
+
+
+def test_convention_b_needs_fewer_changes(result: Audit) -> None:
+    assert result.counts == {"A": 10, "B": 6}
+    assert min(result.counts, key=lambda name: result.counts[name]) == CONVENTION
+    assert [row.equation for row in result.in_a] == [d.equation for d in differences("A")]
+    assert result.holds
+
+
+# ------------------------------------------------------------------ page, files, exit status
+NUMBER = re.compile(r"(?<![\w_])−?\d+(?:\.\d+)?(?:e[+−]?\d+)?")
+
+
+def same_page(old: str, new: str) -> bool:
+    """Equal words, and numbers equal to 1 % (they are written to three digits)."""
+
+    def numbers(line: str) -> list[float]:
+        return [float(n.replace("−", "-")) for n in NUMBER.findall(line)]
+
+    pairs = list(zip(old.splitlines(), new.splitlines(), strict=False))
+    return len(old.splitlines()) == len(new.splitlines()) and all(
+        NUMBER.sub("#", a) == NUMBER.sub("#", b) and np.allclose(numbers(a), numbers(b), rtol=1e-2, atol=0.0)
+        for a, b in pairs
+    )
+
+
+def test_the_page_in_the_docs_is_what_the_command_writes(result: Audit) -> None:
+    page = (DOCS / "audit.md").read_text(encoding="utf-8")
+    assert document.COMMAND in page
+    assert same_page(page, document.markdown(result))
+    assert not same_page(page.replace("0.226", "0.3").replace("0.225", "0.3"), document.markdown(result))
+    for file in re.findall(r"\]\((.+?\.svg)\)", page):
+        assert (DOCS / file).is_file()
+
+
+def test_the_command_writes_its_files_and_fails_if_a_number_does_not_decide(
+    result: Audit, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def run(made: Audit, *arguments: str) -> int:
+        given: Callable[..., Audit] = lambda progress=False: made  # noqa: E731
+        monkeypatch.setattr(document, "audit", given)
+        return command_line.main(["audit", *arguments])
+
+    assert run(result, "-o", str(tmp_path / "new" / "folder")) == 0
+    out = capsys.readouterr().out
+    files = {path.name for path in (tmp_path / "new" / "folder").iterdir()}
+    assert files == {"audit.md", "audit.json", "audit-response.svg", "audit-decay.svg"}
+    assert "10 in convention A" in out and "6 in convention B" in out and rows.UNDECIDED not in out
+    stored = json.loads((tmp_path / "new" / "folder" / "audit.json").read_text(encoding="utf-8"))
+    assert [row["verdict"] for row in stored["rows"]] == [row.verdict for row in result.rows]
+
+    (tmp_path / "file").write_text("")
+    assert run(result, "-o", str(tmp_path / "file")) == 2
+    assert "wanted a folder, got a file" in capsys.readouterr().err
+
+    first = result.rows[0]
+    spoilt = replace(first, evidence=[replace(first.evidence[0], derived=math.nan)])
+    assert run(replace(result, rows=(spoilt, *result.rows[1:]))) == 1
+    assert f"Not decided: {first.equation}." in capsys.readouterr().out
+
+
+# ------------------------------------------------------------------ the verdict itself
+def evidence(**changed: Any) -> Evidence:
+    numbers = {"printed": 2.0, "derived": 0.0, "expected": 0.0, "tolerance": 0.1, "apart": 1.0}
+    return Evidence(measure="", unit="1", **{**numbers, **changed})
+
+
+@pytest.mark.parametrize(
+    ("changed", "kinds"),
+    [
+        ({}, {MISPRINT}),
+        ({"printed": 0.05}, {RIGHT, REFUTED}),
+        ({"printed": 0.5}, set()),  # neither refuted nor confirmed
+        ({"derived": 0.5}, set()),
+        ({"derived": math.nan}, set()),
+        ({"printed": math.nan}, set()),
+        ({"printed": 0.05, "apart": 0.01}, set()),  # no gap: anything would do
+        ({"expected": 3.0}, set()),
+    ],
+)
+def test_a_number_decides_only_what_it_can(changed: dict[str, float], kinds: set[str]) -> None:
+    assert {kind for kind in (MISPRINT, RIGHT, REFUTED) if evidence(**changed).decides(kind)} == kinds
+
+
+def test_a_row_without_evidence_is_not_decided() -> None:
+    empty = Row(equation="", printed="", derived="", evidence=[])
+    assert empty.verdict == rows.UNDECIDED
+    assert replace(empty, evidence=[evidence(), evidence(derived=1.0)]).verdict == rows.UNDECIDED
+
+
+# ------------------------------------------------------------------ numbers by a second way
+def test_power_from_nowhere_is_the_misprints_own_power() -> None:
+    """dE/dt changes by −q̇_i (printed − derived), nothing else: signs and sizes of the law's residual."""
+    import sympy as sp
+
+    from analysis.audit.system import power_residual
+    from analysis.derivation import derive
+
+    d, (q, v, h, dh) = derive(), car.sample()
+    for change in differences(CONVENTION):
+        if "m_z" in str(change.printed):
+            continue  # m_z is taken as m2 in numbers
+        system = planted(change, CONVENTION)
+        known = {p: getattr(system.car, p.name) for p in d.parameters}
+        term = sp.lambdify([*d.q, *d.v, *d.h], (change.printed - change.derived).subs(known))
+        power = -v[change.row] * term(*q, *v, *h)
+        residual = power_residual(system, q, v, h, dh)
+        assert np.all(np.sign(residual) == np.sign(power))
+        ratio = power / residual  # what it was divided by: the same for any misprint
+        if change == differences(CONVENTION)[0]:
+            turnover = ratio
+        assert_allclose(ratio, turnover, rtol=1e-9)
+
+
+def test_what_the_misprints_do_to_the_response_is_linear() -> None:
+    """The nonlinear runs differ as their linear parts do, which are known in closed form."""
+    times, both = response.TIMES[:400:8], response.responses()
+    wrong, right = (make("A").linear_over_the_bump(times, response.HEIGHT)[:, :7] for make in (printed, derived))
+    off = (both["printed"] - both["derived"])[:400:8]
+    assert_allclose(off / np.abs(right).max(axis=0), (wrong - right) / np.abs(right).max(axis=0), atol=1e-3)
+    deviations = response.deviations()
+    by_name = {d.quantity.name: d.difference for d in deviations}
+    assert by_name["body.roll"] == max(by_name.values())
+    assert by_name["body.roll"] > 0.4 and max(sorted(by_name.values())[:-1]) < 0.06
+
+
+def test_both_cars_decay_as_their_eigenvalues_say() -> None:
+    for make in (printed, derived):
+        system = make(CONVENTION)
+        times = np.linspace(0.35, 8.0, 400)
+        x = system.over_the_bump(np.append(0.0, times), 0.01)[1:]
+        slowest = np.linalg.eigvals(system.linear.A).real.max()
+        assert np.all(np.linalg.norm(x, axis=1) <= 20.0 * np.abs(x[0]).max() * np.exp(slowest * (times - times[0])))
+
+
+def test_the_definition_of_the_oscillators_mean_is_that_by_quadrature_over_long_times() -> None:
+    """The mean over one period of 512 samples, against adaptive quadrature over the same, at a point off the axes."""
+    from scipy.integrate import quad
+
+    v = np.array([0.7, -1.1])
+    for force in (section2.S, section2.S_printed):
+        pulled = section2.pulled_back(force)
+        direct = [
+            quad(lambda t, k=k, pulled=pulled: pulled(np.asarray(t), v)[k], 0.0, 2 * np.pi)[0] / (2 * np.pi)
+            for k in range(2)
+        ]
+        assert_allclose(section2.mean(force, v), direct, rtol=1e-10)
+
+
+def test_the_textbook_systems_are_real_and_obey_the_corrected_average() -> None:
+    for seed in range(5):
+        x = averaging.textbook((4, 7, 15), 11, seed)
+        values = x.xi()
+        assert_allclose(values[:3], values[3:].conj(), atol=1e-12 * np.abs(values).max())
+        if not resonance.cubic_condition((4, 7, 15), 11):
+            formula = x.s * (averaging.A_corrected(x.alpha_bar, x.P, x.psi) + averaging.pair_sum(x, halved=True))
+            assert_allclose(x.R_mean(), formula, rtol=1e-9)
+
+
+def test_the_cubic_criterion_is_right_on_systems_drawn_at_random(rng: np.random.Generator) -> None:
+    cases: list[tuple[tuple[int, ...], int]] = []
+    while len(cases) < 30:
+        *beta, W = rng.choice(np.arange(1, 24), size=4, replace=False).tolist()
+        cases.append((tuple(beta), W))
+    verdicts = [resonance.cubic_condition(*case) for case in cases]
+    assert verdicts == [resonance.is_resonant(*case) for case in cases]
+    assert {*verdicts} == {True, False}
