@@ -1,0 +1,136 @@
+"""`python -m analysis certify` and `verify`: certificates made, judged, and put into words."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from fmu_src.quantities import CORNER_WORDS, STATES
+from fmu_src.vehicle.equations import equations_of_motion
+
+from .bertolino_baksa.adversary import reference_floor
+from .bertolino_baksa.balls import NotProvedError, precision
+from .bertolino_baksa.cells import errors_of_states, outputs
+from .bertolino_baksa.certificate import Certificate, from_json, to_json, verify
+from .bertolino_baksa.norms import proved_metric
+from .bertolino_baksa.proof import Proof
+from .bertolino_baksa.quick import quick_floors
+from .car import car_form, road_signal
+from .car_certificates import build, certify_car, metric_of, model_of, stop
+from .errors import InputError
+from .exact_car import exact_car, norms
+from .files import write_whole
+from .linear_response import linear_response
+from .polynomials import Array
+from .reference import Parameters, car_of, road_parameters
+from .tyres import static_loads_of
+
+
+def make_certificate(parameters: Parameters, where: Path | None) -> int:
+    """Certify x_lin from rest, print what is proved, write the file; 0, or 1 if there is no certificate."""
+    print("Finding and proving a reference motion ...", file=sys.stderr, flush=True)
+    try:
+        certificate, proof = certify_car(parameters)
+    except NotProvedError as error:
+        print(f"no certificate: {error}")
+        return 1
+    for line in statement(certificate, proof):
+        print(line)
+    if where is not None:
+        write_whole(where, to_json(certificate))
+        print(f"{where}: written")
+    return 0
+
+
+def judge_certificate(path: Path) -> int:
+    """Prove a certificate's claims anew; 0 if all are proved, 1 if not."""
+    certificate = from_json(path.read_bytes(), str(path))
+    try:
+        proof = verify(certificate, build)
+    except NotProvedError as error:
+        print(f"{path}: NOT proved: {error}")
+        return 1
+    for line in statement(certificate, proof):
+        print(line)
+    print(f"{path}: every claim is proved")
+    return 0
+
+
+def quick_answer(parameters: Parameters) -> int:
+    """Print floors from the scalar comparison, and how coarse they are; 0, or 1 if it proves none."""
+    car, road = car_of(parameters), road_parameters(parameters)
+    form, signal = car_form(car), road_signal(road)
+    try:
+        with precision(2):
+            system = build(model_of(parameters))
+            end = stop(system, form.A)
+            x_lin = linear_response(form.A, form.B, np.zeros(14), signal, np.linspace(0.0, float(end), 2000))
+            named = norms(car, x_lin)
+            floors = quick_floors(system, proved_metric(system, metric_of(car)), named, [0.0] * 14, end)
+    except NotProvedError as error:
+        print(f"no quick answer: {error}")
+        return 1
+    true = reference_floor(form, signal, named, np.zeros(14), float(end))
+    for norm, floor, least in zip(named, floors, true, strict=True):
+        print(f"l <= {floor:.4g} in the {norm.name} norm ({floor / least:.2g} times what a reference motion reaches)")
+    return 0
+
+
+def statement(certificate: Certificate, proof: Proof) -> list[str]:
+    """What is proved, line by line, each certified number beside an empirical one."""
+    parameters = certificate.model["parameters"]
+    gain = certificate.model.get("gain")
+    form = car_form(car_of(parameters), gain=None if gain is None else np.array(gain))
+    signal, end = road_signal(road_parameters(parameters)), float(certificate.pieces[-1].end)
+    true = reference_floor(form, signal, [c.norm for c in certificate.claims], certificate.x0, end)
+    lines = ["x_lin is almost stable (definition 2.1): for all t >= 0 and every eps >= l,"]
+    for claim, floor in zip(certificate.claims, true.tolist(), strict=True):
+        epsilon, delta = claim.table[-1].tolist()
+        lines.append(
+            f"  {claim.norm.name} norm: l = {claim.floor:.6g} (a reference motion reaches {floor:.6g}: "
+            f"ratio {claim.floor / floor:.4f}); delta up to {delta:.4g}, at eps = {epsilon:.4g}"
+        )
+    ends = "x -> 0 after the road's end" if proof.repetition is None else "every period's tube returns into itself"
+    return [*lines, f"  {ends}", *_tubes(proof), *_tyres(parameters, proof)]
+
+
+def _tubes(proof: Proof) -> list[str]:
+    bounds = errors_of_states(proof.tube, proof.metric).max(axis=0)
+    named = ", ".join(f"{q.name} {b:.3g} {q.unit}" for q, b in zip(STATES[:7], bounds[:7].tolist(), strict=True))
+    return [f"  |x - x_lin| of the motion from rest: {named}"]
+
+
+def _tyres(parameters: Parameters, proof: Proof) -> list[str]:
+    """Smallest load of each tyre along the motion from x0, and whether the springs only push."""
+    motion = equations_of_motion(exact_car(car_of(parameters)), lambda x: x.sin(), lambda x: x.cos())
+
+    def forces(x: Sequence[object], w: Sequence[object], sin: object, cos: object) -> Sequence[object]:
+        return motion(x[:7], x[7:], [0.0] * 4, w[:4], w[4:])[2]  # type: ignore[no-any-return]
+
+    with precision(2):
+        low = outputs(proof.system, proof.tube, proof.metric, forces)[0] + static_loads_of(car_of(parameters))
+    worst = int(np.argmin(low))
+    said = f"  smallest tyre load on the pieces: {low[worst]:.4g} N ({CORNER_WORDS[worst]})"
+    if low[worst] > 0.0:
+        return [f"{said}; every tyre stays on the ground"]
+    return [f"{said}; contact is not proved: where a load is negative the certificate speaks of springs that pull"]
+
+
+def largest_amplitude(parameters: Parameters, closeness: float = 0.02) -> float:
+    """Largest A [m] with a certificate, found by bisection to this ratio. Raises InputError if the given A has none."""
+    good = float(parameters.get("A", 0.01))
+    bad = np.inf
+    while not bad <= good * (1.0 + closeness):
+        middle = 2.0 * good if bad == np.inf else float(np.sqrt(good * bad))
+        try:
+            certify_car({**parameters, "A": middle}, table=False)
+            good = middle
+        except NotProvedError:
+            bad = middle
+    return good
+
+
+__all__ = ["InputError", "Array"]
