@@ -52,7 +52,7 @@ STYLE = {
     "svg.fonttype": "path",
     "svg.hashsalt": "bertolino-baksa",  # else the ids in the file are new each time
 }
-WIDTH, PANEL_HEIGHT = 7.2, 2.5  # inches
+WIDTH, PANEL_HEIGHT, PICTURE_HEIGHT = 7.2, 2.5, 2.0  # inches
 COLUMNS = 2000  # of a panel, finer than the eye or a printer
 
 
@@ -182,8 +182,27 @@ def render(subject: Subject) -> bytes:
             axes[0].set_xlim(start, end)
         for line in (line for ax in axes for line in ax.get_lines()):
             thin(line, (start, end))
-        image = io.BytesIO()
-        figure.savefig(image, format="svg", metadata={"Title": subject.title, "Date": None, "Creator": None})
+        return _svg(figure, subject.title)
+
+
+def render_pictures(pictures: Sequence[Panel], columns: int, title: str) -> bytes:
+    """Pictures to one scale, without axes, in rows of so many, as SVG."""
+    rows = -(-len(pictures) // columns)
+    with style.context(STYLE, after_reset=True):
+        figure = Figure(figsize=(WIDTH, PICTURE_HEIGHT * rows), layout="constrained")
+        axes = figure.subplots(rows, columns, squeeze=False, sharex=True, sharey=True).ravel()
+        for ax in axes:
+            ax.set_axis_off()
+            ax.set_aspect("equal")
+            ax.margins(0.02)
+        for picture, ax in zip(pictures, axes, strict=False):
+            picture(ax)
+        return _svg(figure, title)
+
+
+def _svg(figure: Figure, title: str) -> bytes:
+    image = io.BytesIO()
+    figure.savefig(image, format="svg", metadata={"Title": title, "Date": None, "Creator": None})
     return image.getvalue()
 
 
