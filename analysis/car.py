@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from fmu_src.quantities import STATES
 from fmu_src.road.profiles import SNAP, RoadParameters
 from fmu_src.vehicle.equations import equations_of_motion
+from fmu_src.vehicle.linear import linearized
 from fmu_src.vehicle.parameters import Car
 
 from .polynomials import Array
@@ -26,6 +27,11 @@ from .standard_form import Equations, Function, StandardForm, standard_form
 def car_form(car: Car, *, gain: Array | None = None, order: int = 5) -> StandardForm:
     """The car: states x = (q, q̇) (14), inputs w = (h, ḣ) (8); with a gain (4, 14), under forces u = −gain x."""
     return standard_form(car_equations(car, gain), [q.name for q in STATES], 8, order=order)
+
+
+def actuators(car: Car) -> Array:
+    """B_u (14, 4) of x' = A x + B w + B_u u: what forces u [N] of the actuators do."""
+    return np.array(linearized(car).Bu)
 
 
 def exact_A(car: Car) -> list[list[Fraction]]:

@@ -159,6 +159,18 @@ def plot_comparison(controlled: Trajectory, uncontrolled: Trajectory, q: Quantit
     return finish(ax)
 
 
+def plot_discrepancy(time: Array, x: Array, x_lin: Array, q: Quantity, ax: Axes) -> Axes:
+    """A quantity, its linear approximation, and what is between them, magnified by a power of ten to be seen."""
+    unit, factor = READING[q.unit]
+    away, largest = np.abs(x - x_lin).max(), np.abs(x).max()
+    power = int(np.floor(np.log10(largest / away))) if 0.0 < away < largest else 0
+    ax.plot(time, factor * x, label=f"${q.symbol}$ {words(q)}")
+    ax.plot(time, factor * x_lin, label="linear approximation")
+    ax.plot(time, factor * 10.0**power * (x - x_lin), color=RED, linestyle="-", label=f"difference × $10^{{{power}}}$")
+    ax.set_ylabel(axis_label((q,), unit))
+    return finish(ax)
+
+
 def plot_tyre_loads(time: Array, loads: Array, quantities: Sequence[Quantity], ax: Axes) -> Axes:
     """Total loads (n, k) [N] of k tyres, and the line below which they would have left the ground."""
     for q, load in zip(quantities, loads.T, strict=True):

@@ -1,4 +1,4 @@
-"""What `python -m analysis modes` gives: a table and its claims, and a folder with modes.json, modes.svg, quasilinear.md."""
+"""What `python -m analysis modes` gives: a table, claims, and a folder of modes.json, modes.svg and quasilinear.md."""
 
 from __future__ import annotations
 
@@ -25,11 +25,10 @@ LEAST_SHARE = 0.05  # of the kinetic energy, below which a motion is not named i
 def claims(found: CarModes) -> list[Finding]:
     """That rest is asymptotically stable, and that no two eigenvalues coincide: both proved in ball arithmetic."""
     discs = found.discs
+    right = int(np.count_nonzero(discs.centres.real + discs.radii >= 0.0))
     counts = {
         "every motion of the linear part decays: eigenvalues not proved to lie left of the imaginary axis "
-        f"(the rightmost disc ends at {discs.abscissa:.6g} 1/s)": np.count_nonzero(
-            discs.centres.real + discs.radii >= 0
-        ),
+        f"(the rightmost disc ends at {discs.abscissa:.6g} 1/s)": right,
         f"no two eigenvalues coincide: pairs of discs that touch (least gap {discs.gap:.3g} 1/s)": discs.touching,
     }
     source = f"discs around the eigenvalues of A, of radius {discs.radii.max():.1e} 1/s or less"
@@ -48,7 +47,7 @@ def claims(found: CarModes) -> list[Finding]:
 
 
 def rows(found: CarModes) -> list[tuple[str, ...]]:
-    """For each mode: name, frequency and damping, time constant, eigenvalue, proved radius, shares of kinetic energy."""
+    """One row of text for each mode, below HEADINGS."""
     return [
         (
             found.names[k],

@@ -1,11 +1,13 @@
 """Quasi-linearization (§3.2): the tensors of (3.9) expanded to third order, for numbers or for symbols, and (3.10).
 
     q̈_i + b_ij q̇_j + c_ij q_j − d_ij h_j [− e_ij ḣ_j − g_ij u_j]
-        = m_ijkl q̇_j q̇_k q_l − b_ijkl q̇_j q_k q_l − c_ijkl q_j q_k q_l + d_ijkl h_j q_k q_l [+ e_ijkl ḣ_j … + g_ijkl u_j …]
+        = m_ijkl q̇_j q̇_k q_l − b_ijkl q̇_j q_k q_l − c_ijkl q_j q_k q_l
+        + d_ijkl h_j q_k q_l [+ e_ijkl ḣ_j q_k q_l + g_ijkl u_j q_k q_l]
 
-(bars left out). The print drops c_ijkl, the cubic stiffness, which is of the same order as what it keeps, and the largest;
-it writes the b-term with q̇_j q̇_k q_l. What it lacks because its tyres have no dampers and its struts no actuators are
-e (rates of the road) and g (actuator forces). There are no other monomials of degree ≤ 3, and none of degree 2.
+(bars left out). The print drops c_ijkl, the cubic stiffness, which is of the same order as what it keeps and on the
+paper's bump the largest term of all; it writes the b-term with q̇_j q̇_k q_l. Not in the print, whose tyres have no
+dampers and whose struts have no actuators, are e (rates of the road) and g (actuator forces). There are no other
+monomials of degree ≤ 3, and none of degree 2.
 
 Convention: a tensor is symmetric in those indices that belong to factors of the same kind, which makes it unique: m in
 jk; b, d, e, g of four indices in kl; c in jkl. So the coefficient of a monomial in q̈_i is the entry times the number of
@@ -14,9 +16,8 @@ its different arrangements, up to the sign above. Indices count from 0 in code, 
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields, replace
-from fractions import Fraction
 from itertools import permutations, product
 from types import SimpleNamespace
 from typing import Any
@@ -87,7 +88,7 @@ class Tensor:
 
 @dataclass(frozen=True, slots=True)
 class Quasilinear:
-    """Tensors by name (the keys of TERMS; one that vanishes is there without entries), and what (3.10) makes of them."""
+    """Tensors by name (all of TERMS; one that vanishes has no entries), and what (3.10) makes of them."""
 
     tensors: Mapping[str, Tensor]
 
@@ -122,9 +123,22 @@ class Quasilinear:
         return sign * np.einsum(contraction, self[name].dense(), *(factors[kind] for kind in kinds))
 
 
-def quasilinear(car: Any) -> Quasilinear:
-    """Tensors of this car: numbers for a Car, expressions for `symbolic_car()`, for any object with a car's fields."""
-    y = variables(len(_VARIABLES), 3)
+def quasilinear(car: Car) -> Quasilinear:
+    """Tensors of this car, in numbers."""
+    return _expanded(car, 1.0, lambda value: value)
+
+
+def symbolic() -> Quasilinear:
+    """Tensors of any car, as factored sympy expressions in positive symbols that are written as in the paper."""
+    import sympy as sp
+
+    symbols = {f.name: sp.Symbol(PARAMETERS[f.name].symbol, positive=True) for f in fields(Car)}
+    return _expanded(SimpleNamespace(**symbols), sp.Integer(1), sp.factor)
+
+
+def _expanded(car: Any, one: Any, tidy: Callable[[Any], Any]) -> Quasilinear:
+    """Expand (3.9) for a car whose parameters are of the kind of `one`; tidy: brings sums that vanish to 0."""
+    y = variables(len(_VARIABLES), 3, one)
     q, v, u, h, dh = ([x for x, (kind, _) in zip(y, _VARIABLES, strict=True) if kind == wanted] for wanted in _ORDER)
     accelerations, _, _ = equations_of_motion(car, sin, cos)(q, v, u, h, dh)
     entries: dict[str, dict[tuple[int, ...], Any]] = {name: {} for name in TERMS}
@@ -133,17 +147,10 @@ def quasilinear(car: Any) -> Quasilinear:
             name, index = _place(i, monomial)
             sign = TERMS[name][1]
             count = len(Tensor(TERMS[name][0], {}).arrangements(index))
-            value = _tidy(coefficient * sign / count)
+            value = tidy(coefficient * sign / count)
             if value != 0:
                 entries[name][index] = value
     return Quasilinear({name: Tensor(TERMS[name][0], dict(sorted(found.items()))) for name, found in entries.items()})
-
-
-def symbolic_car() -> SimpleNamespace:
-    """The car's parameters as positive sympy symbols, written as in the paper."""
-    import sympy as sp
-
-    return SimpleNamespace(**{f.name: sp.Symbol(PARAMETERS[f.name].symbol, positive=True) for f in fields(Car)})
 
 
 def quasilinear_form(car: Car, *, complete: bool = True) -> StandardForm:
@@ -163,15 +170,6 @@ def _place(i: int, monomial: Monomial) -> tuple[str, tuple[int, ...]]:
     factors = sorted((_VARIABLES[m] for m in monomial), key=lambda factor: (order.index(factor[0]), factor[1]))
     name, _ = _OF_KINDS[tuple(kind for kind, _ in factors)]
     return name, (i, *(j for _, j in factors))
-
-
-def _tidy(value: Any) -> Any:
-    """Expressions in factors, so that those that vanish are seen to; numbers as they are."""
-    if isinstance(value, int | float | Fraction):
-        return float(value)
-    import sympy as sp
-
-    return sp.factor(value)
 
 
 def _below(accelerations: Any) -> Array:

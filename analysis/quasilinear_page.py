@@ -1,4 +1,4 @@
-r"""The footnote of §3.2: every coefficient of the quasi-linear equations, in symbols and in numbers, as a page of Markdown."""
+"""The footnote of §3.2 as a page of Markdown: every coefficient of the quasi-linear equations, formula and number."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from fmu_src.quantities import ACCELERATIONS, POSITIONS, Quantity
 
 from .figures import readable
-from .quasilinear import FACTORS, TERMS, Quasilinear, Tensor, quasilinear, symbolic_car
+from .quasilinear import FACTORS, TERMS, Quasilinear, Tensor, symbolic
 
 LETTERS = {"v": r"\dot q", "u": "u", "h": "h", "dh": r"\dot h", "q": "q"}
 BARRED = ("b_ij", "c_ij", "d_ij", "m_ijkl", "b_ijkl", "c_ijkl")  # as in the print, which writes d_ijkl without a bar
@@ -25,10 +25,20 @@ ABOUT = {
     "g_ijkl": "Actuators; not in the paper.",
 }
 
+PROOF = """\
+Names and shares after the kinetic energy of the motion. Each eigenvalue is proved, by ball arithmetic from the exact
+parameters, to lie in a disc of the radius given; its centre is rounded here.
+"""
+CONVENTION = """\
+Roads $h$ and actuators $u$ are numbered front left, front right, rear left, rear right. A tensor is symmetric in the
+indices that belong to factors of the same kind; of equal entries one is listed, with their number. The coefficient of
+the product in the equation is sign × number × entry. There are no other products up to third order, and none of second.
+"""
+
 
 def page(title: str, command: str, numbers: Quasilinear, modes: Sequence[Sequence[str]], picture: str) -> str:
     """The page for one car: its tensors beside the general formulas, and the table and picture of its modes."""
-    formulas = quasilinear(symbolic_car())
+    formulas = symbolic()
     return "\n".join(
         [
             f"# Quasi-linear equations and modes: {title}",
@@ -42,9 +52,7 @@ def page(title: str, command: str, numbers: Quasilinear, modes: Sequence[Sequenc
             "",
             f"![The car in its seven modes]({picture})",
             "",
-            "Names and shares after the kinetic energy of the motion; eigenvalues are proved to lie in discs of the",
-            "radius given around the centres printed (centres here rounded), by ball arithmetic from the exact parameters.",
-            "",
+            PROOF,
             *(line for name in TERMS for line in _section(name, formulas[name], numbers[name])),
         ]
     )
@@ -59,11 +67,7 @@ def _introduction() -> list[str]:
         "",
         *_table([("index", "$q$", "variable of the FMU", "unit"), *coordinates]),
         "",
-        "Roads $h$ and actuators $u$ are numbered front left, front right, rear left, rear right. A tensor is symmetric in",
-        "the indices that belong to factors of the same kind; of equal entries one is listed, with their number. The",
-        "coefficient of the product in the equation is sign × number × entry. There are no other products up to third",
-        "order, and none of second.",
-        "",
+        CONVENTION,
     ]
 
 
