@@ -53,7 +53,7 @@ def car_modes(car: Car) -> CarModes:
     return CarModes(found, enclosures(exact_A(car), found.eigenvalues), _names(shares), shares)
 
 
-def energy_shares(car: Car, shapes: Complex) -> Array:
+def energy_shares(car: Car, shapes: Array | Complex) -> Array:
     """Parts (k, 7) of z, ψ, φ, z11 and z12 in phase and opposite, z2, ψ2 in the kinetic energy of k shapes (7, k).
 
     The mass matrix at rest is diagonal, so that coordinates share the energy out; the two front wheels' part is split

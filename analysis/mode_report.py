@@ -52,7 +52,7 @@ def rows(found: CarModes) -> list[tuple[str, ...]]:
         (
             found.names[k],
             found.words(k),
-            f"{-1.0 / found.discs.centres[k].real:.4g} s",
+            _times(*found.discs.centres[[k, k + 7]]),
             _pair(*found.discs.centres[[k, k + 7]]),
             f"{found.discs.radii[[k, k + 7]].max():.1e}",
             _shares(found, k),
@@ -62,6 +62,12 @@ def rows(found: CarModes) -> list[tuple[str, ...]]:
 
 
 HEADINGS = ("mode", "damped frequency, damping ratio", "time constant", "eigenvalue [1/s]", "± (proved)", "what moves")
+
+
+def _times(value: complex, other: complex) -> str:
+    """Time constants, in which a motion decays to 1/e."""
+    constants = dict.fromkeys(f"{-1.0 / each.real:.4g} s" if each.real else "∞" for each in (value, other))
+    return ", ".join(constants)
 
 
 def _pair(value: complex, other: complex) -> str:

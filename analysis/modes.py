@@ -117,7 +117,8 @@ def enclosures(A: Sequence[Sequence[Any]] | Array, near: Complex) -> Enclosures:
                 balls = flint.acb_mat(exact).eig()
             except ValueError:  # of flint, where discs overlap
                 continue
-            middles = np.array([complex(ball.mid()) for ball in balls])
+            # of a real A the discs that meet the real axis are centred on it, and so hold a real eigenvalue
+            middles = np.array([complex((ball.real if ball.imag.contains(0) else ball).mid()) for ball in balls])
             found = [int(np.argmin(np.abs(middles - value))) for value in near]
             if len(set(found)) < len(found):
                 continue

@@ -154,12 +154,12 @@ def test_formulas_that_can_be_read_off_the_equations(formulas: Quasilinear) -> N
 
 
 # ---------------------------------------------------------------------------------------------------- the page
-def test_the_page_in_the_docs_is_what_the_command_writes(tmp_path: Path) -> None:
+def test_the_page_in_the_docs_is_what_the_command_writes(formulas: Quasilinear, tmp_path: Path) -> None:
     car = Car()
     write(car, car_modes(car), "the default car", "python -m analysis modes -o DIR", tmp_path)
     written = (tmp_path / "quasilinear.md").read_text(encoding="utf-8")
     assert written == (ROOT / "docs" / "default-car" / "quasilinear.md").read_text(encoding="utf-8")
-    entries = sum(len(symbolic()[name].entries) for name in TERMS)
+    entries = sum(len(formulas[name].entries) for name in TERMS)
     assert sum(line.startswith(("| $\\bar", "| $d_", "| $e_", "| $g_")) for line in written.splitlines()) == entries
     for line in written.splitlines():
         assert line.count("{") == line.count("}") and line.count("$") % 2 == 0, line
