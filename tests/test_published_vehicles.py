@@ -1,7 +1,9 @@
-"""Third-party truth: the quarter truck of the Open Simulation Platform, as the symmetric heave of a car of four of it.
+"""Third-party truth: vehicles of other people, as cars of ours.
 
-400 kg on 15000 N/m and 1000 N s/m, 40 kg on a tyre of 150000 N/m. Published: its poles, and its response from rest to a
-step of 0.1 m, z1 of the chassis and z2 of the wheel.
+The quarter truck of the Open Simulation Platform is the symmetric heave of a car of four of it: 400 kg on 15000 N/m and
+1000 N s/m, 40 kg on a tyre of 150000 N/m. Published: its poles, and its response from rest to a step of 0.1 m, z1 of
+the chassis and z2 of the wheel. Vehicle 2 of CommonRoad (a BMW 320i; package commonroad-vehicle-models, BSD) is a whole
+car; its anti-roll bars, which ours lacks, are idle where left and right move alike.
 """
 
 from __future__ import annotations
@@ -76,3 +78,32 @@ def test_its_published_step_response_comes_through_the_fmus(case: Any) -> None:
     angles = [run.trajectory[name] for name in ("body.roll", "body.pitch", "axle_r.roll")]
     assert np.abs(angles).max() < 1e-12  # it is the symmetric motion
     assert all(finding.holds for finding in check(run))
+
+
+# ---------------------------------------------------------------------------------------------------- vehicle 2
+BMW = Car(
+    m=965.7108098804363,
+    **dict.fromkeys(("m11", "m12", "m21", "m22"), 0.5 * 63.7921826056784),
+    m2=0.0,
+    Jx=207.26524557936952,
+    Jy=1565.8178787125541,
+    Jz=1791.5995300122856,
+    J2=0.0,
+    c1=24453.137879749014,
+    c2=19635.504745231297,
+    **dict.fromkeys(("cp1", "cp2"), 158294.1398119115),
+    **dict.fromkeys(("b1", "b2"), 0.0),
+    a=1.1561957064,
+    b=1.4227170936,
+    s1=0.5 * 1.38684,
+    **dict.fromkeys(("s0", "s2"), 0.5 * 1.36398),
+)
+
+
+def test_a_bmw_bounces_and_hops_at_its_published_undamped_frequencies() -> None:
+    """Those of the seven in which left and right move alike: heave, pitch, and both axles' hop [Hz]."""
+    found = car_modes(BMW)
+    alike = found.shares[:, [0, 2, 3, 5]].sum(axis=1) > 0.5  # z, φ, z11 + z12, z2
+    frequencies = found.modes.beta[:7][alike] / (2.0 * np.pi)
+    np.testing.assert_allclose(frequencies[:2], [1.4203, 1.4360], atol=5e-5)
+    np.testing.assert_allclose(frequencies[2:], [11.898, 12.060], atol=5e-4)
