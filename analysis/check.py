@@ -32,6 +32,8 @@ def check(run: Run) -> list[Finding]:
     """
     if missing := lacking(run):
         raise InputError(f"the run cannot be checked: it lacks the columns {', '.join(missing)}")
+    if len(run.trajectory.time) < 2:
+        raise InputError("trajectory.csv: wanted at least two rows to check a motion, got one")
     forces, switches = _held(run)
     x, t = run.trajectory.columns([q.name for q in STATES]), run.trajectory.time
     expected = integrate(run.parameters, forces, switches, x[0], t)

@@ -14,6 +14,7 @@ from analysis import discrepancy
 from analysis.check import check
 from analysis.cosimulation import simulate
 from analysis.discrepancy import linear_states, scales
+from analysis.errors import InputError
 from analysis.linear_response import held_response
 from analysis.scenario import Scenario, read_scenario
 from analysis.trajectory import Run
@@ -131,3 +132,10 @@ def test_tiny_and_large_motions_have_their_order_taken_at_one_size() -> None:
     for factor in (0.1, 20.0):  # up to 0.2 rad
         found = check(run_at("bump", factor))
         assert found[3].measured == pytest.approx(3.0, abs=0.01), factor
+
+
+def test_a_single_row_is_no_motion_to_check() -> None:
+    run = run_at("bump", 1.0)
+    row = replace(run.trajectory, time=run.trajectory.time[:1], values=run.trajectory.values[:1])
+    with pytest.raises(InputError, match="at least two rows"):
+        check(replace(run, trajectory=row))
