@@ -67,6 +67,11 @@ def _parser() -> argparse.ArgumentParser:
     verb = verbs.add_parser("audit", help="audit the equations and claims of the paper; needs no run")
     verb.add_argument("-o", "--out", type=Path, metavar="DIR", help="also write audit.md, audit.json and figures there")
     verb.set_defaults(do=_audit)
+
+    verb = verbs.add_parser("modes", help="modes of a scenario's car, and the tensors of its quasi-linear equations")
+    verb.add_argument("scenario", nargs="?", help=f"{scenario} (default: the default car)")
+    verb.add_argument("-o", "--out", type=Path, metavar="DIR", help="folder for modes.json, modes.svg, quasilinear.md")
+    verb.set_defaults(do=_modes)
     return parser
 
 
@@ -138,8 +143,7 @@ def _judge(run: Run, folder: Path) -> int:
     text = json.dumps([f.as_json() for f in findings], indent=1, ensure_ascii=False) + "\n"
     write_whole(folder / FINDINGS, text.encode())
     for f in findings:
-        verdict = "holds" if f.holds else "FAILS"
-        print(f"{verdict}: {f.claim}: {f.measured:.3g} (wanted {f.expected:g} ± {f.tolerance:.2g}; {f.source})")
+        print(f.line)
     return 0 if all(f.holds for f in findings) else 1
 
 
@@ -161,6 +165,17 @@ def _audit(options: argparse.Namespace) -> int:
         for path in write(result, options.out):
             print(f"{path}: written")
     return 0 if result.holds else 1
+
+
+def _modes(options: argparse.Namespace) -> int:
+    from .mode_report import run
+    from .reference import car_of
+
+    if options.scenario is None:
+        return run(car_of({}), "the default car", "python -m analysis modes -o DIR", options.out)
+    scenario = read_scenario(options.scenario)
+    command = f"python -m analysis modes {options.scenario} -o DIR"
+    return run(car_of(scenario.parameters), f"the car of {scenario.name}", command, options.out)
 
 
 def _leave(status: int) -> NoReturn:

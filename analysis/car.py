@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import asdict
+from fractions import Fraction
 from itertools import pairwise
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -12,9 +15,11 @@ from numpy.typing import NDArray
 from fmu_src.quantities import STATES
 from fmu_src.road.profiles import SNAP, RoadParameters
 from fmu_src.vehicle.equations import equations_of_motion
+from fmu_src.vehicle.linear import linearized
 from fmu_src.vehicle.parameters import Car
 
 from .polynomials import Array
+from .power_series import cos, sin, variables
 from .signals import Piece, Signal
 from .standard_form import Equations, Function, StandardForm, standard_form
 
@@ -22,6 +27,18 @@ from .standard_form import Equations, Function, StandardForm, standard_form
 def car_form(car: Car, *, gain: Array | None = None, order: int = 5) -> StandardForm:
     """The car: states x = (q, q̇) (14), inputs w = (h, ḣ) (8); with a gain (4, 14), under forces u = −gain x."""
     return standard_form(car_equations(car, gain), [q.name for q in STATES], 8, order=order)
+
+
+def actuators(car: Car) -> Array:
+    """B_u (14, 4) of x' = A x + B w + B_u u: what forces u [N] of the actuators do."""
+    return np.array(linearized(car).Bu)
+
+
+def exact_A(car: Car) -> list[list[Fraction]]:
+    """A of (3.10), (14, 14), with nothing rounded: the car's numbers are the decimals that floats print."""
+    exact = SimpleNamespace(**{name: Fraction(repr(value)) for name, value in asdict(car).items()})
+    rates = car_equations(exact, None)(variables(14, 1, Fraction(1)), [0] * 8, sin, cos)
+    return [[Fraction(rate.terms.get((j,), 0)) for j in range(14)] for rate in rates]
 
 
 def car_equations(car: Any, gain: Array | None) -> Equations:

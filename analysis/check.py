@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import numpy as np
 
 from fmu_src.quantities import FORCES, ROAD_BOWS, ROAD_HEIGHTS, ROAD_RATES, STATES, STRUT_TRAVELS
 from fmu_src.road.profiles import SNAP
 
+from . import discrepancy
+from .discrepancy import Forces, scales
 from .energy import balance
 from .errors import InputError
 from .findings import Finding
@@ -26,10 +26,23 @@ NEEDED = (*STATES, *ROAD_HEIGHTS, *ROAD_RATES, *ROAD_BOWS, *FORCES, *STRUT_TRAVE
 
 
 def check(run: Run) -> list[Finding]:
-    """Findings on a run: it is a motion of (3.1)–(3.7), and its energy balances. Raises InputError for `lacking`."""
+    """Findings on a run: it is a motion of (3.1)–(3.7), its energy balances, and how far it is from x_lin of (2.3).
+
+    Raises InputError for `lacking`.
+    """
     if missing := lacking(run):
         raise InputError(f"the run cannot be checked: it lacks the columns {', '.join(missing)}")
-    return [_is_a_motion(run), _energy_balances(run)]
+    if len(run.trajectory.time) < 2:
+        raise InputError("trajectory.csv: wanted at least two rows to check a motion, got one")
+    forces, switches = _held(run)
+    x, t = run.trajectory.columns([q.name for q in STATES]), run.trajectory.time
+    expected = integrate(run.parameters, forces, switches, x[0], t)
+    tolerance = _tolerance(DEVIATION, run)
+    return [
+        _is_a_motion(x, expected, tolerance),
+        _energy_balances(run),
+        *discrepancy.findings(run, expected, forces, switches, tolerance),
+    ]
 
 
 def lacking(run: Run) -> list[str]:
@@ -37,13 +50,9 @@ def lacking(run: Run) -> list[str]:
     return [q.name for q in NEEDED if q.name not in run.trajectory.names]
 
 
-def _is_a_motion(run: Run) -> Finding:
+def _is_a_motion(x: Array, expected: Array, tolerance: float) -> Finding:
     """The exported states against DOP853 on the full equations, with the exact road and the exported, held forces."""
-    names = [q.name for q in STATES]
-    x, t = run.trajectory.columns(names), run.trajectory.time
-    forces, switches = _held(run)
-    expected = integrate(run.parameters, forces, switches, x[0], t)
-    deviation = np.abs(x - expected).max(axis=0) / _scales(expected)
+    deviation = np.abs(x - expected).max(axis=0) / scales(expected)
     worst = int(np.argmax(deviation))
     return Finding(
         claim="the run is a motion of the car on this road under these forces: deviation from a direct integration, "
@@ -51,13 +60,13 @@ def _is_a_motion(run: Run) -> Finding:
         equation="(3.1)–(3.7)",
         measured=float(deviation[worst]),
         expected=0.0,
-        tolerance=_tolerance(DEVIATION, run),
+        tolerance=tolerance,
         unit="1",
-        source=f"trajectory.csv, column {names[worst]}",
+        source=f"trajectory.csv, column {STATES[worst].name}",
     )
 
 
-def _held(run: Run) -> tuple[Callable[[float, object], list[float]], list[float]]:
+def _held(run: Run) -> tuple[Forces, list[float]]:
     """The exported forces as a function of time, held from each row to the next, and the times at which they change."""
     t, u = run.trajectory.time, run.trajectory.columns([q.name for q in FORCES])
     switches = t[1:][np.any(np.diff(u, axis=0) != 0.0, axis=1)]
@@ -67,12 +76,6 @@ def _held(run: Run) -> tuple[Callable[[float, object], list[float]], list[float]
         return table[max(0, int(np.searchsorted(t, time, side="right")) - 1)]
 
     return forces, switches.tolist()
-
-
-def _scales(x: Array) -> Array:
-    """Largest absolute value of each state; of states that (nearly) rest, a millionth of the largest of all."""
-    largest = np.abs(x).max(axis=0)
-    return np.maximum(largest, max(1e-6 * largest.max(), 1e-12))
 
 
 def _energy_balances(run: Run) -> Finding:

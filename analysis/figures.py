@@ -52,7 +52,7 @@ STYLE = {
     "svg.fonttype": "path",
     "svg.hashsalt": "bertolino-baksa",  # else the ids in the file are new each time
 }
-WIDTH, PANEL_HEIGHT = 7.2, 2.5  # inches
+WIDTH, PANEL_HEIGHT, PICTURE_HEIGHT = 7.2, 2.5, 2.0  # inches
 COLUMNS = 2000  # of a panel, finer than the eye or a printer
 
 
@@ -159,6 +159,18 @@ def plot_comparison(controlled: Trajectory, uncontrolled: Trajectory, q: Quantit
     return finish(ax)
 
 
+def plot_discrepancy(time: Array, x: Array, x_lin: Array, q: Quantity, ax: Axes) -> Axes:
+    """A quantity, its linear approximation, and what is between them, magnified by a power of ten to be seen."""
+    unit, factor = READING[q.unit]
+    away, largest = np.abs(x - x_lin).max(), np.abs(x).max()
+    power = int(np.floor(np.log10(largest / away))) if 0.0 < away < largest else 0
+    ax.plot(time, factor * x, label=f"${q.symbol}$ {words(q)}")
+    ax.plot(time, factor * x_lin, label="linear approximation")
+    ax.plot(time, factor * 10.0**power * (x - x_lin), color=RED, linestyle="-", label=f"difference × $10^{{{power}}}$")
+    ax.set_ylabel(axis_label((q,), unit))
+    return finish(ax)
+
+
 def plot_tyre_loads(time: Array, loads: Array, quantities: Sequence[Quantity], ax: Axes) -> Axes:
     """Total loads (n, k) [N] of k tyres, and the line below which they would have left the ground."""
     for q, load in zip(quantities, loads.T, strict=True):
@@ -182,8 +194,27 @@ def render(subject: Subject) -> bytes:
             axes[0].set_xlim(start, end)
         for line in (line for ax in axes for line in ax.get_lines()):
             thin(line, (start, end))
-        image = io.BytesIO()
-        figure.savefig(image, format="svg", metadata={"Title": subject.title, "Date": None, "Creator": None})
+        return _svg(figure, subject.title)
+
+
+def render_pictures(pictures: Sequence[Panel], columns: int, title: str) -> bytes:
+    """Pictures to one scale, without axes, in rows of so many, as SVG."""
+    rows = -(-len(pictures) // columns)
+    with style.context(STYLE, after_reset=True):
+        figure = Figure(figsize=(WIDTH, PICTURE_HEIGHT * rows), layout="constrained")
+        axes = figure.subplots(rows, columns, squeeze=False, sharex=True, sharey=True).ravel()
+        for ax in axes:
+            ax.set_axis_off()
+            ax.set_aspect("equal")
+            ax.margins(0.02)
+        for picture, ax in zip(pictures, axes, strict=False):
+            picture(ax)
+        return _svg(figure, title)
+
+
+def _svg(figure: Figure, title: str) -> bytes:
+    image = io.BytesIO()
+    figure.savefig(image, format="svg", metadata={"Title": title, "Date": None, "Creator": None})
     return image.getvalue()
 
 

@@ -22,6 +22,13 @@ class Finding:
     def holds(self) -> bool:
         return abs(self.measured - self.expected) <= self.tolerance
 
+    @property
+    def line(self) -> str:
+        """The verdict in one line of a terminal."""
+        verdict = "holds" if self.holds else "FAILS"
+        wanted = f"wanted {self.expected:g} ± {self.tolerance:.2g}"
+        return f"{verdict}: {self.claim}: {self.measured:.3g} ({wanted}; {self.source})"
+
     def as_json(self) -> dict[str, Any]:
         """All fields and the verdict."""
         return {**asdict(self), "holds": self.holds}

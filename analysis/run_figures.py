@@ -4,17 +4,21 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import cache, partial
 from pathlib import Path
 
-from fmu_src.quantities import CORNER_WORDS, FORCES, POSITIONS, ROAD_HEIGHTS, TYRE_FORCES, Quantity
+import numpy as np
 
+from fmu_src.quantities import CORNER_WORDS, FORCES, POSITIONS, ROAD_HEIGHTS, STATES, TYRE_FORCES, Quantity
+
+from .discrepancy import linear_states
 from .figures import (
     READING,
     Axes,
     Subject,
     Window,
     plot_comparison,
+    plot_discrepancy,
     plot_heaves,
     plot_quantities,
     plot_tyre_loads,
@@ -69,7 +73,7 @@ def subjects(run: Run, counterpart: Run | None) -> list[Subject]:
         made.append(_comparison(pair[True], pair[False]))
     if True in pair and _acts(pair[True]):
         made.append(_strut_forces(pair[True], "" if is_controlled(run) else " They are those of the counterpart run."))
-    return [*made, _tyre_loads(run)]
+    return [*made, _tyre_loads(run), _linear_approximation(run)]
 
 
 def _paper_figures(run: Run) -> list[Subject]:
@@ -183,4 +187,33 @@ def _tyre_loads(run: Run) -> Subject:
         panels=(partial(axle, slice(0, 2)), partial(axle, slice(2, 4))),
         sources=(run.trajectory,),
         needs=TYRE_FORCES,
+    )
+
+
+def _linear_approximation(run: Run) -> Subject:
+    linear = cache(lambda: linear_states(run))
+
+    def caption() -> str:
+        x, t = run.trajectory.columns([q.name for q in POSITIONS]), run.trajectory.time
+        away = np.abs(x - linear()[:, : len(POSITIONS)])
+        readings = [
+            f"{words(q)} {readable(READING[q.unit][1] * column.max(), 2)} {READING[q.unit][0]}"
+            f" at {t[column.argmax()]:.3g} s"
+            for q, column in zip(POSITIONS, away.T, strict=True)
+        ]
+        return (
+            "Not in the paper. The run beside the solution (2.3) of the linear equations with the same start, on the "
+            f"same road, under the same forces. Largest differences: {', '.join(readings)}."
+        )
+
+    def panel(q: Quantity, ax: Axes) -> Axes:
+        return plot_discrepancy(run.trajectory.time, run.trajectory[q.name], linear()[:, STATES.index(q)], q, ax)
+
+    return Subject(
+        file="linear-approximation.svg",
+        title="The linear approximation",
+        caption=caption,
+        panels=[partial(panel, q) for q in (Z, PHI, PSI, PSI2)],
+        sources=(run.trajectory,),
+        needs=(*STATES, *FORCES),
     )

@@ -132,7 +132,7 @@ def test_the_page_stands_alone_and_a_hostile_title_stays_text(full: Path) -> Non
     assert page.text.count("<script>alert('1')</script> & <img src=http://example.org/x>") == 2  # title, heading
     assert not page.all("script") and not page.all("link")
     addresses = [a[key] for _, a in page.elements for key in ("src", "href", "srcset", "action") if key in a]
-    assert len(addresses) == len(page.all("figure")) == 8
+    assert len(addresses) == len(page.all("figure")) == 9
     for address in addresses:
         head, _, data = str(address).partition(",")
         assert head == "data:image/svg+xml;base64"

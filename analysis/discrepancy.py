@@ -1,0 +1,95 @@
+"""The discrepancy between a run and its linear approximation x_lin, Eq. (2.3): §2's question, on exported trajectories.
+
+The car's equations are odd in (x, h, u): if start, road and forces shrink by one factor, x − x_lin shrinks by its cube.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from fmu_src.quantities import FORCES, POSITIONS, STATES
+from fmu_src.road.profiles import HARMONICS
+
+from .car import actuators, car_form, road_signal
+from .findings import Finding
+from .linear_response import held_response, linear_response
+from .reference import car_of, integrate, road_parameters
+from .trajectory import Array, Run
+
+Forces = Callable[[float, list[float]], Sequence[float]]
+SMALL = 0.02  # m or rad: the largest coordinate at which the order is measured, and at half of it
+RESOLVED = 1e-9  # of the largest state: a discrepancy that direct integrations, to 1e-12, tell from their error
+
+
+def linear_states(run: Run) -> Array:
+    """x_lin (n, 14) at the run's times, from its first row, over its road, under its exported forces.
+
+    The forces are those of the run, held from each row to the next: the linear plant is compared, not another loop.
+    """
+    t, u = run.trajectory.time, run.trajectory.columns([q.name for q in FORCES])
+    x0 = run.trajectory.columns([q.name for q in STATES])[0]
+    car, road = car_of(run.parameters), road_signal(road_parameters(run.parameters), t[0])
+    form = car_form(car, order=1)
+    passive = linear_response(form.A, form.B, x0, road, t)
+    return (passive + held_response(form.A, actuators(car), u.T, t)).T
+
+
+def scales(x: Array) -> Array:
+    """Largest absolute value of each state; of states that (nearly) rest, a millionth of the largest of all."""
+    largest = np.abs(x).max(axis=0)
+    return np.maximum(largest, max(1e-6 * largest.max(), 1e-12))
+
+
+def findings(run: Run, expected: Array, forces: Forces, switches: Sequence[float], tolerance: float) -> list[Finding]:
+    """The run's discrepancy is that of the car; and it is of order 3, unless the motion is a linear one.
+
+    expected  : the motion by direct integration (n, 14).  forces, switches : as `integrate` takes them.
+    tolerance : of the run's states over their maxima.
+    """
+    t, linear = run.trajectory.time, linear_states(run)
+    x = run.trajectory.columns([q.name for q in STATES])
+    relative, exact = (np.abs(y - linear) / scales(expected) for y in (x, expected))
+    row, state = (int(i) for i in np.unravel_index(np.argmax(exact), exact.shape))
+    place = f"column {STATES[state].name} at t = {t[row]:.4g} s"
+    size = Finding(
+        claim="the run differs from the linear approximation x_lin as the car does: largest discrepancy, over each "
+        "state's maximum",
+        equation="(2.3)",
+        measured=float(relative.max()),
+        expected=float(exact.max()),
+        tolerance=tolerance,
+        unit="1",
+        source=f"trajectory.csv; {place}",
+    )
+    scale = SMALL / max(float(np.abs(linear[:, : len(POSITIONS)]).max()), 1e-12)
+
+    def at(factor: float) -> float:
+        """Discrepancy of that state at that time, all amplitudes multiplied by the factor."""
+        there = _motion(run, forces, switches, x[0], t[: row + 1], factor)
+        return abs(float(there[-1, state] - factor * linear[row, state]))
+
+    if row == 0 or (large := at(scale)) <= RESOLVED * scale * np.abs(linear).max():
+        return [size]
+    order = Finding(
+        claim="that discrepancy is of order 3 in the amplitude of start, road and forces: order between direct "
+        f"integrations with coordinates up to {0.5e3 * SMALL:g} and {1e3 * SMALL:g} mm or mrad",
+        equation="(2.3)",
+        measured=float(np.log2(large / at(0.5 * scale))),
+        expected=3.0,
+        tolerance=0.1,
+        unit="1",
+        source=place,
+    )
+    return [size, order]
+
+
+def _motion(run: Run, forces: Forces, switches: Sequence[float], x0: Array, times: Array, factor: float) -> Array:
+    """The motion at the times, by direct integration, with start, road and forces so many times as large."""
+    heights = {name: factor * float(run.parameters[name]) for name in ("A", *HARMONICS) if name in run.parameters}
+
+    def scaled(time: float, state: list[float]) -> list[float]:
+        return [factor * u for u in forces(time, state)]
+
+    return integrate({**run.parameters, **heights}, scaled, switches, factor * x0, times)
