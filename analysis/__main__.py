@@ -72,6 +72,17 @@ def _parser() -> argparse.ArgumentParser:
     verb.add_argument("scenario", nargs="?", help=f"{scenario} (default: the default car)")
     verb.add_argument("-o", "--out", type=Path, metavar="DIR", help="folder for modes.json, modes.svg, quasilinear.md")
     verb.set_defaults(do=_modes)
+
+    verb = verbs.add_parser("certify", help="prove that x_lin is almost stable (definition 2.1) on a scenario's road")
+    verb.add_argument("scenario", help=scenario)
+    verb.add_argument("-o", "--out", type=Path, metavar="CERT", help="certificate to write (JSON)")
+    verb.add_argument("--quick", action="store_true", help="a coarse floor in a second, by scalar comparison")
+    verb.add_argument("--largest", action="store_true", help="also search the largest amplitude that can be certified")
+    verb.set_defaults(do=_certify)
+
+    verb = verbs.add_parser("verify", help="prove a certificate's claims anew")
+    verb.add_argument("certificate", type=Path, metavar="CERT", help="certificate (JSON)")
+    verb.set_defaults(do=_verify)
     return parser
 
 
@@ -176,6 +187,21 @@ def _modes(options: argparse.Namespace) -> int:
     scenario = read_scenario(options.scenario)
     command = f"python -m analysis modes {options.scenario} -o DIR"
     return run(car_of(scenario.parameters), f"the car of {scenario.name}", command, options.out)
+
+
+def _certify(options: argparse.Namespace) -> int:
+    from .certificate_command import make_certificate, quick_answer
+
+    scenario = read_scenario(options.scenario)
+    if options.quick:
+        return quick_answer(scenario.parameters)
+    return make_certificate(scenario.parameters, options.out, largest=options.largest)
+
+
+def _verify(options: argparse.Namespace) -> int:
+    from .certificate_command import judge_certificate
+
+    return judge_certificate(options.certificate)
 
 
 def _leave(status: int) -> NoReturn:

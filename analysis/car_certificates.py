@@ -9,11 +9,13 @@ import numpy as np
 from flint import fmpq
 
 from fmu_src.quantities import ParameterError
+from fmu_src.vehicle.parameters import Car
 
 from .bertolino_baksa.balls import ExactSystem, NotProvedError, precision
 from .bertolino_baksa.certificate import Certificate, certify
-from .bertolino_baksa.norms import modal_metric
-from .bertolino_baksa.proof import Proof
+from .bertolino_baksa.norms import modal_metric, proved_metric
+from .bertolino_baksa.proof import Proof, prove
+from .bertolino_baksa.taylor import find_pieces
 from .car import car_form
 from .errors import InputError
 from .exact_car import energy_norm, exact_system, norms
@@ -53,6 +55,20 @@ def certify_car(parameters: Mapping[str, Any], gain: Array | None = None) -> tup
 
     Raises NotProvedError, with the reason, if there is none; InputError for parameters that cannot be.
     """
+    model, car, S, end = _prepared(parameters, gain)
+    return certify(model, build, S, lambda x_lin: norms(car, x_lin), end, np.zeros(14))
+
+
+def prove_reference(parameters: Mapping[str, Any], gain: Array | None = None) -> Proof:
+    """The proof behind a certificate, without its table of δ(ε)."""
+    model, _, S, end = _prepared(parameters, gain)
+    with precision(2):
+        system = build(model)
+        return prove(system, proved_metric(system, S), find_pieces(system, [0.0] * 14, end), [0.0] * 14)
+
+
+def _prepared(parameters: Mapping[str, Any], gain: Array | None) -> tuple[dict[str, Any], Car, Array, fmpq]:
+    """Model, car, metric, and the time at which the pieces may end."""
     model = model_of(parameters, gain)
     try:
         with precision(2):
@@ -60,9 +76,13 @@ def certify_car(parameters: Mapping[str, Any], gain: Array | None = None) -> tup
     except (TypeError, ValueError, ParameterError) as error:
         raise InputError(f"the parameters of car and road: {error}") from error
     car = car_of(dict(parameters))
-    form = car_form(car, gain=gain, order=1)
-    S = modal_metric(form.A, energy_norm(car).T)
-    return certify(model, build, S, lambda x_lin: norms(car, x_lin), stop(system, form.A), np.zeros(14))
+    A = car_form(car, gain=gain, order=1).A
+    return model, car, metric_of(car, gain), stop(system, A)
+
+
+def metric_of(car: Car, gain: Array | None = None) -> Array:
+    """S (14, 14): modes of the (fed back) car, weighed by the energy."""
+    return modal_metric(car_form(car, gain=gain, order=1).A, energy_norm(car).T)
 
 
 def stop(system: ExactSystem, A: Array) -> fmpq:

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from fmu_src.quantities import CORNER_WORDS, STATES
+from fmu_src.quantities import CORNER_WORDS, PARAMETERS, STATES
 from fmu_src.vehicle.equations import equations_of_motion
 
 from .bertolino_baksa.adversary import reference_floor
@@ -19,17 +19,18 @@ from .bertolino_baksa.norms import proved_metric
 from .bertolino_baksa.proof import Proof
 from .bertolino_baksa.quick import quick_floors
 from .car import car_form, road_signal
-from .car_certificates import build, certify_car, metric_of, model_of, stop
-from .errors import InputError
+from .car_certificates import build, certify_car, metric_of, model_of, prove_reference, stop
 from .exact_car import exact_car, norms
 from .files import write_whole
 from .linear_response import linear_response
-from .polynomials import Array
 from .reference import Parameters, car_of, road_parameters
 from .tyres import static_loads_of
 
+CLOSE = 1.02  # ratio at which the bisection for the largest amplitude stops
+TINY = 1e-6  # m; below it the search for an amplitude is given up
 
-def make_certificate(parameters: Parameters, where: Path | None) -> int:
+
+def make_certificate(parameters: Parameters, where: Path | None, *, largest: bool = False) -> int:
     """Certify x_lin from rest, print what is proved, write the file; 0, or 1 if there is no certificate."""
     print("Finding and proving a reference motion ...", file=sys.stderr, flush=True)
     try:
@@ -39,6 +40,8 @@ def make_certificate(parameters: Parameters, where: Path | None) -> int:
         return 1
     for line in statement(certificate, proof):
         print(line)
+    if largest:
+        print(f"  the largest A with a proved tube: {largest_amplitude(parameters):.4g} m (by bisection, to {CLOSE:g})")
     if where is not None:
         write_whole(where, to_json(certificate))
         print(f"{where}: written")
@@ -98,7 +101,7 @@ def statement(certificate: Certificate, proof: Proof) -> list[str]:
 
 
 def _tubes(proof: Proof) -> list[str]:
-    bounds = errors_of_states(proof.tube, proof.metric).max(axis=0)
+    bounds = errors_of_states(proof.tube, proof.metric)
     named = ", ".join(f"{q.name} {b:.3g} {q.unit}" for q, b in zip(STATES[:7], bounds[:7].tolist(), strict=True))
     return [f"  |x - x_lin| of the motion from rest: {named}"]
 
@@ -108,7 +111,7 @@ def _tyres(parameters: Parameters, proof: Proof) -> list[str]:
     motion = equations_of_motion(exact_car(car_of(parameters)), lambda x: x.sin(), lambda x: x.cos())
 
     def forces(x: Sequence[object], w: Sequence[object], sin: object, cos: object) -> Sequence[object]:
-        return motion(x[:7], x[7:], [0.0] * 4, w[:4], w[4:])[2]  # type: ignore[no-any-return]
+        return motion(x[:7], x[7:], [0.0] * 4, w[:4], w[4:])[2]
 
     with precision(2):
         low = outputs(proof.system, proof.tube, proof.metric, forces)[0] + static_loads_of(car_of(parameters))
@@ -119,18 +122,15 @@ def _tyres(parameters: Parameters, proof: Proof) -> list[str]:
     return [f"{said}; contact is not proved: where a load is negative the certificate speaks of springs that pull"]
 
 
-def largest_amplitude(parameters: Parameters, closeness: float = 0.02) -> float:
-    """Largest A [m] with a certificate, found by bisection to this ratio. Raises InputError if the given A has none."""
-    good = float(parameters.get("A", 0.01))
-    bad = np.inf
-    while not bad <= good * (1.0 + closeness):
-        middle = 2.0 * good if bad == np.inf else float(np.sqrt(good * bad))
+def largest_amplitude(parameters: Parameters) -> float:
+    """Largest height A [m] of the road for which a tube is proved, by bisection; 0.0 if none is found."""
+    good, bad = 0.0, np.inf
+    middle = float(parameters.get("A", PARAMETERS["A"].start))
+    while not bad <= good * CLOSE and (middle > TINY or good):
         try:
-            certify_car({**parameters, "A": middle}, table=False)
+            prove_reference({**parameters, "A": middle})
             good = middle
         except NotProvedError:
             bad = middle
+        middle = 2.0 * good if bad == np.inf else float(np.sqrt(max(good, bad / 4.0) * bad))
     return good
-
-
-__all__ = ["InputError", "Array"]

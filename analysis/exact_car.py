@@ -22,9 +22,13 @@ from .polynomials import Array
 NEVER = fmpq(1000000)  # s; where a wheel meets no road
 
 
+def exact_car(car: Car) -> Any:
+    """The car's parameters as balls around the decimals that they print."""
+    return SimpleNamespace(**{f.name: arb(decimal(getattr(car, f.name))) for f in fields(Car)})
+
+
 def exact_system(car: Car, road: RoadParameters, gain: Array | None = None) -> ExactSystem:
     """x' = F(x, w): the car of `car.car_form` with its four wheels on the road from t = 0 on."""
-    exact = SimpleNamespace(**{f.name: arb(decimal(getattr(car, f.name))) for f in fields(Car)})
     delays = _delays(road)
     half = decimal(road.Lambda) / (2 * decimal(road.v0))  # half a wave; π/Ω
     end = {"bump": half, "flat": fmpq(0)}.get(road.profile, NEVER)
@@ -32,7 +36,7 @@ def exact_system(car: Car, road: RoadParameters, gain: Array | None = None) -> E
     shape = _shape(road, half)
     pieces = tuple((begin, _under_wheels(shape, delays, [d <= begin < d + end for d in delays])) for begin in corners)
     period = 2 * half if road.profile in ("sine", "fourier", "step") else fmpq(0)
-    return ExactSystem(14, 8, car_equations(exact, gain), pieces, period)
+    return ExactSystem(14, 8, car_equations(exact_car(car), gain), pieces, period)
 
 
 def _delays(road: RoadParameters) -> list[fmpq]:

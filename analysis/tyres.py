@@ -5,17 +5,23 @@ from __future__ import annotations
 import numpy as np
 
 from fmu_src.quantities import TYRE_FORCES
+from fmu_src.vehicle.parameters import Car
 
+from .reference import car_of
 from .trajectory import Array, Run
 
 G = 9.81  # m/s2
 
 
 def static_loads(run: Run) -> Array:
-    """Loads (4) [N] of the tyres fl, fr, rl, rr of the car at rest: its share of the body, its wheel, half the beam."""
-    m, m11, m12, m21, m22, m2, a, b = run.reals("m", "m11", "m12", "m21", "m22", "m2", "a", "b")
-    front, rear = m * b / (2 * (a + b)), m * a / (2 * (a + b)) + m2 / 2
-    return G * np.array([front + m11, front + m12, rear + m21, rear + m22])
+    """Loads (4) [N] of the tyres fl, fr, rl, rr of the run's car at rest."""
+    return static_loads_of(car_of(run.parameters))
+
+
+def static_loads_of(car: Car) -> Array:
+    """Loads (4) [N] of the tyres of a car at rest: its share of the body, its wheel, half the beam."""
+    front, rear = car.m * car.b / (2 * (car.a + car.b)), car.m * car.a / (2 * (car.a + car.b)) + car.m2 / 2
+    return G * np.array([front + car.m11, front + car.m12, rear + car.m21, rear + car.m22])
 
 
 def tyre_loads(run: Run) -> Array:

@@ -5,18 +5,21 @@ All motions are integrated at once (Runge–Kutta of order 4 on the full equatio
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 
 import numpy as np
+from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 
 from ..linear_response import linear_response
-from ..signals import Signal
+from ..signals import Piece, Signal
 from ..standard_form import StandardForm
 from .balls import Array
 from .norms import Norm
 
 STEP = 5e-4  # s, at most
+SAMPLING = 5e-4  # s, of the true floor
 CANDIDATES = 64  # starts that the linear part proposes
 ROUNDS = 6  # of local search around the worst of them
 CROWD = 48  # starts of a round
@@ -50,6 +53,24 @@ def excursions(form: StandardForm, signal: Signal, norms: Sequence[Norm], x0: Ar
     for (_, x), lin in zip(rows, x_lin.T, strict=True):
         found = np.maximum(found, [norm(x - lin[:, None]) for norm in norms])
     return found
+
+
+def reference_floor(form: StandardForm, signal: Signal, norms: Sequence[Norm], x0: Array, stop: float) -> Array:
+    """sup N(x − x_lin) (norms,) up to `stop` [s] of the motion from x0 itself, tightly integrated: the true floor."""
+    times, e = [], []
+    edges, x = [t for t in signal.edges if t < stop] + [stop], np.asarray(x0, dtype=float)
+    for piece, begin, end in zip(signal.pieces, edges, edges[1:], strict=False):
+
+        def rate(t: float, y: Array, piece: Piece = piece) -> Sequence[float]:
+            return form.equations(y.tolist(), piece(t).tolist(), math.sin, math.cos)
+
+        at = np.linspace(begin, end, max(2, int((end - begin) / SAMPLING)))
+        solution = solve_ivp(rate, (begin, end), x, "DOP853", at, rtol=1e-11, atol=1e-16)
+        times.append(solution.t)
+        e.append(solution.y)
+        x = solution.y[:, -1]
+    off = np.concatenate(e, axis=1) - linear_response(form.A, form.B, x0, signal, np.concatenate(times))
+    return np.array([norm(off).max() for norm in norms])
 
 
 def worst(

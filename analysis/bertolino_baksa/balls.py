@@ -123,7 +123,7 @@ def rounded(m: arb_mat) -> tuple[Array, float]:
 def coefficients(series: Any, length: int) -> list[Any]:
     """The first coefficients of a series (or of a constant), zeros appended."""
     found = series.coeffs() if isinstance(series, arb_series) else [arb(series)]
-    return [*found, *[arb(0)] * (length - len(found))]
+    return [*found[:length], *[arb(0)] * (length - len(found))]
 
 
 def jacobian(system: ExactSystem, x: Balls, w: Balls, *, inputs: bool = False) -> arb_mat:

@@ -127,6 +127,15 @@ def _sampled(coefficients: Array, cells: int, sizes: Array | None = None) -> tup
     return coefficients @ powers, second / (8.0 * cells**2) + EPS * sizes.sum(axis=1)
 
 
+def errors_of_states(tube: Tube, metric: Metric) -> Array:
+    """sup |e_j| (n,) over all pieces."""
+    found = []
+    for piece, V in zip(tube.pieces, tube.error, strict=True):
+        values, bend = _sampled(piece.error, CELLS * FINER)
+        found.append(np.abs(values).max(axis=1) + bend + V * metric.reach)
+    return np.max(found, axis=0) * (1 + EPS)
+
+
 def outputs(system: ExactSystem, tube: Tube, metric: Metric, functions: Outputs) -> tuple[Array, Array]:
     """Smallest and largest value (k,) of the outputs functions(x, w, sin, cos) along x, over all pieces."""
     low, high = [], []
