@@ -83,7 +83,7 @@ def _load(system: Path, folder: Path, stack: contextlib.ExitStack) -> tuple[Wiri
     outside = [s for s in wiring.sources.values() if not (place / s).resolve().is_relative_to(place.resolve())]
     if outside:
         raise InputError(f"{system}: wanted FMUs inside it, got links that lead elsewhere: {', '.join(outside)}")
-    components = {}
+    components: dict[str, Component] = {}
     for name, source in wiring.sources.items():
         component = Component(name, place / source, folder / "fmus" / str(len(components)))
         stack.callback(component.free)
