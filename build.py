@@ -151,7 +151,7 @@ def build_fmu(model: str, package: Path, target: Path) -> None:
 
     from fmu_src.export.contents import extra_entries
 
-    identity = hashlib.sha256(f"{model} {_content_hash([package], LEFT_OUT)}".encode()).hexdigest()[:32]
+    identity = hashlib.sha256(f"{model} {ENTRY} {_content_hash([package], LEFT_OUT)}".encode()).hexdigest()[:32]
     name = f"fmu_src_{identity[:12]}"
     with tempfile.TemporaryDirectory(prefix="build_fmu_") as temporary:
         folder = Path(temporary)

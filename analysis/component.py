@@ -52,6 +52,10 @@ class Component:
 
     def __init__(self, name: str, archive: Path, folder: Path) -> None:
         self.name, self.log = name, list[str]()
+        if "%" in folder.as_uri().replace("%20", ""):  # the library decodes nothing else, and ends the process
+            raise InputError(
+                f"{folder}: wanted a folder for FMUs without special characters; set TMPDIR to a plain one"
+            )
         try:
             self.sha256 = hashlib.sha256(archive.read_bytes()).hexdigest()
             extract(archive, folder)

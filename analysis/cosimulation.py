@@ -83,13 +83,13 @@ def _load(system: Path, folder: Path, stack: contextlib.ExitStack) -> tuple[Wiri
     outside = [s for s in wiring.sources.values() if not (place / s).resolve().is_relative_to(place.resolve())]
     if outside:
         raise InputError(f"{system}: wanted FMUs inside it, got links that lead elsewhere: {', '.join(outside)}")
-    components = {}
+    components: dict[str, Component] = {}
     for name, source in wiring.sources.items():
-        component = Component(name, place / source, folder / "fmus" / name)
+        component = Component(name, place / source, folder / "fmus" / str(len(components)))
         stack.callback(component.free)
         components[name] = component
-    ports = {*wiring.feeds, *wiring.feeds.values()}
-    lacking = [str(p) for p in ports if not components[p.component].has(p.variable)]
+    ends = [*((p, "input") for p in wiring.feeds), *((p, "output") for p in wiring.feeds.values())]
+    lacking = {f"{p} ({kind})" for p, kind in ends if p.variable not in components[p.component].named(kind)}
     if lacking:
         raise InputError(f"{system}: its FMUs lack these of its connectors: {', '.join(sorted(lacking))}")
     return wiring, components

@@ -53,15 +53,10 @@ def read_wiring(path: Path, shown: Path | None = None) -> Wiring:
     except (OSError, etree.XMLSyntaxError) as error:
         raise InputError(f"{shown}: cannot be read as a system structure: {error}") from error
     components = list(root.iterfind(".//ssd:Component", _NS))
-    connectors = {
-        Port(name, connector.get("name", "")): connector
-        for name, element in [*((c.get("name", ""), c) for c in components), ("", root.find("ssd:System", _NS))]
-        if element is not None
-        for connector in element.iterfind("ssd:Connectors/ssd:Connector", _NS)
-    }
-    kinds = {port: connector.get("kind", "") for port, connector in connectors.items()}
     faults = [] if components else [f"{shown}: wanted at least one component, got none"]
     faults += [f"{shown}:{c.sourceline}: {fault}" for c in components for fault in _component_faults(c, components)]
+    connectors = _connectors(root, components, shown, faults)
+    kinds = {port: connector.get("kind", "") for port, connector in connectors.items()}
     units = _units(root, connectors, shown, faults)
     connections = _connections(root, kinds, shown, faults)
     inputs = [port for port, kind in kinds.items() if kind == "input" and port.component]
@@ -103,6 +98,20 @@ def conversions(wiring: Wiring, fmus: Mapping[Port, Unit]) -> dict[Port, Convers
     if faults:
         raise InputError("\n".join(faults))
     return found
+
+
+def _connectors(
+    root: etree._Element, components: list[etree._Element], shown: Path, faults: list[str]
+) -> dict[Port, etree._Element]:
+    """The connectors of the components and of the system itself; those that stand there twice join the faults."""
+    connectors: dict[Port, etree._Element] = {}
+    for name, element in [*((c.get("name", ""), c) for c in components), ("", root.find("ssd:System", _NS))]:
+        for connector in () if element is None else element.iterfind("ssd:Connectors/ssd:Connector", _NS):
+            port = Port(name, connector.get("name", ""))
+            if port in connectors:
+                faults.append(f"{shown}:{connector.sourceline}: the connector {port} stands there twice")
+            connectors.setdefault(port, connector)
+    return connectors
 
 
 def _units(
@@ -155,12 +164,12 @@ def _transforms(connection: etree._Element) -> bool:
 
 
 def _component_faults(component: etree._Element, components: list[etree._Element]) -> list[str]:
-    """Names and sources become paths: neither may lead out of the folder that the archive is unpacked into."""
+    """A source becomes a path, which may not lead out of the folder that the archive is unpacked into."""
     name, source = component.get("name", ""), component.get("source", "")
     first = next(c for c in components if c.get("name", "") == name)
     inside = source and not PurePosixPath(source).is_absolute() and ".." not in PurePosixPath(source).parts
     return [
-        *([] if name not in ("", "..") and PurePosixPath(name).name == name else [f"a component is called {name!r}"]),
+        *([] if name else ["a component has no name"]),
         *([] if first is component else [f"component {name!r} stands there twice, first in line {first.sourceline}"]),
         *(
             []

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 from collections.abc import Iterable
 from dataclasses import asdict
@@ -108,7 +109,7 @@ class Slave(Variables):
         self._running = False
 
     def _check_step(self, t: float, step: float) -> None:
-        if not (isfinite(t) and 0.0 <= step < float("inf")):
+        if not (step >= 0.0 and isfinite(t + step)):
             raise StepError("wanted a finite time and a step >= 0")
         if not isfinite(sum(self.u)):
             faults = [f"{q.name} = {x!r} {q.unit}" for q, x in self._inputs() if not isfinite(x)]
@@ -155,17 +156,22 @@ class Slave(Variables):
         return {
             "identity": self.identity,
             "cells": [self.u[:], self.y[:], self.p[:], self.chosen[:], self.on[:]],
-            "phase": [self.time, self._stale, self._running, self._failed],
+            "phase": [self.time, self._stale, self._running],
+            "failed": self._failed,
             "memory": self.memory() if self._running else None,
         }
 
     def _set_fmu_state(self, state: dict[str, Any]) -> None:
         """Return to a state of this or another instance of the same code."""
         try:
-            if self._failed or state["identity"] != self.identity:
-                raise ValueError("another FMU's, or this instance has failed")
+            if state["identity"] != self.identity:
+                raise ValueError("another FMU's")
+            if self._failed or state["failed"]:
+                raise ValueError(
+                    "that of an instance that has failed" if state["failed"] else "this instance has failed"
+                )
             self.u[:], self.y[:], self.p[:], self.chosen[:], self.on[:] = state["cells"]
-            self.time, self._stale, self._running, self._failed = state["phase"]
+            self.time, self._stale, self._running = state["phase"]
             if self._running:
                 self.recall(state["memory"])
                 self.configure()
@@ -174,17 +180,15 @@ class Slave(Variables):
 
     @staticmethod
     def _fmu_state_to_bytes(state: dict[str, Any]) -> bytes:
-        """JSON: doubles as repr, so that they come back bit for bit."""
-        return json.dumps(state, default=asdict).encode()
+        """JSON (doubles as repr, so that they come back bit for bit) behind its SHA-256, by which damage is seen."""
+        text = json.dumps(state, default=asdict).encode()
+        return hashlib.sha256(text).digest() + text
 
     @staticmethod
     def _fmu_state_from_bytes(state: bytes) -> dict[str, Any]:
-        """The state from its bytes (JSON, doubles as repr); of bytes that are none, a state that will be refused."""
-        try:
-            data = json.loads(state)
-        except (ValueError, RecursionError):
-            return {}
-        return data if isinstance(data, dict) else {}
+        """The state from its bytes; of bytes that `_fmu_state_to_bytes` has not made, one that will be refused."""
+        digest, text = state[:32], state[32:]
+        return dict(json.loads(text)) if hashlib.sha256(text).digest() == digest else {}
 
     def to_xml(self, model_options: dict[str, str] | None = None) -> Element:
         """PythonFMU's description, completed."""

@@ -159,7 +159,7 @@ def test_texts_say_what_is_needed(dist: Path, model: str) -> None:
     assert files["documentation/licenses/license.txt"] == (ROOT / "LICENSE").read_bytes()
     assert b"NTNU" in files["documentation/licenses/pythonfmu.txt"]
     needs = files["documentation/externalDependencies.txt"].decode("ascii")
-    for word in ("CPython 3.11", "LD_PRELOAD", "PYTHONHOME", "sys.base_prefix", "_Py_NoneStruct", "glibc 2.32"):
+    for word in ("CPython 3.10", "LD_PRELOAD", "PYTHONHOME", "sys.base_prefix", "_Py_NoneStruct", "glibc 2.32"):
         assert word in needs
     assert ("control>=" in needs) == (model == "LqrController")
 

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from functools import cache
 from math import isfinite
 from pathlib import Path
-from tempfile import mkdtemp
 
-from conftest import ROOT
+import pytest
 from fmpy import extract
 from host import OK, Host
 from hypothesis import HealthCheck, settings
@@ -21,9 +19,13 @@ STEPS = st.sampled_from([0.0, 1e-9, 1e-3, 1e-3, 1e-3, 0.01, 0.3, 5.0, 1e6, 1e300
 TIMES = st.sampled_from([0.0, 1e-3, 0.25, 100.0, -5.0]) | ANY
 
 
-@cache
-def unpacked(model: str) -> Path:
-    return Path(extract(ROOT / "dist" / f"{model}.fmu", Path(mkdtemp(prefix="fuzz_")) / model))
+UNPACKED: dict[str, Path] = {}
+
+
+@pytest.fixture(scope="module", autouse=True)
+def unpacked(dist: Path, tmp_path_factory: pytest.TempPathFactory) -> None:
+    for model in build.MODELS:
+        UNPACKED[model] = Path(extract(dist / f"{model}.fmu", tmp_path_factory.mktemp("fuzz") / model))
 
 
 class AnyCalls(RuleBasedStateMachine):
@@ -33,7 +35,7 @@ class AnyCalls(RuleBasedStateMachine):
 
     @initialize(model=st.sampled_from(list(build.MODELS)), start=st.booleans())
     def instantiate(self, model: str, start: bool) -> None:
-        self.host, self.initialized = Host(unpacked(model)), start
+        self.host, self.initialized = Host(UNPACKED[model]), start
         if start:
             assert self.host.start() == OK
 

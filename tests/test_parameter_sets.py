@@ -54,6 +54,25 @@ def test_every_file_of_the_ssp_is_valid(contents: dict[str, bytes]) -> None:
         assert schema.validate(etree.fromstring(contents[name])), (name, schema.error_log)
 
 
+@pytest.mark.parametrize("name", ["SystemStructure.ssd", "Complete.ssd"])
+def test_experiment_and_both_vendors_annotations_are_those_of_the_default_scenario(
+    contents: dict[str, bytes], name: str
+) -> None:
+    """OMSimulator, which is not run here, reads the step from its own; in the namespace and place of its schema."""
+    oms = "https://raw.githubusercontent.com/OpenModelica/OMSimulator/master/schema/oms.xsd"
+    osp = "http://opensimulationplatform.com/SSP/OSPAnnotations"
+    root, bump = etree.fromstring(contents[name]), read_scenario("bump")
+    (experiment,) = root.iterfind("ssd:DefaultExperiment", NS)
+    assert [float(experiment.get(k, "")) for k in ("startTime", "stopTime")] == [bump.start_time, bump.stop_time]
+    found = []
+    for place, vendor in (("ssd:System", "org.openmodelica"), ("ssd:DefaultExperiment", "com.opensimulationplatform")):
+        found += root.findall(f"{place}/ssd:Annotations/ssc:Annotation[@type='{vendor}']", NS)
+    theirs, ospes = found
+    path = f"{{{oms}}}Annotations/{{{oms}}}SimulationInformation/{{{oms}}}FixedStepMaster"
+    assert [float(master.get("stepSize", "")) for master in theirs.iterfind(path)] == [bump.step]
+    assert [float(each.get("baseStepSize", "")) for each in ospes.iter(f"{{{osp}}}FixedStepAlgorithm")] == [bump.step]
+
+
 def test_the_same_sources_give_the_same_files(contents: dict[str, bytes]) -> None:
     assert system_contents() == {name: data for name, data in contents.items() if not name.endswith(".fmu")}
 

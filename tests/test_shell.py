@@ -168,7 +168,9 @@ def test_an_input_that_is_not_finite_is_refused_and_can_be_repaired(load: Loader
 
 
 @pytest.mark.parametrize("model", MODELS)
-@pytest.mark.parametrize(("t", "h"), [(0.0, -1.0), (float("nan"), H), (0.0, float("inf")), (0.0, float("nan"))])
+@pytest.mark.parametrize(
+    ("t", "h"), [(0.0, -1.0), (float("nan"), H), (0.0, float("inf")), (0.0, float("nan")), (1e308, 1e308)]
+)
 def test_impossible_steps_are_refused(load: Loader, model: str, t: float, h: float) -> None:
     host = begun(load, model)
     assert host.step(t, h) == DISCARD
@@ -237,11 +239,21 @@ def test_a_state_of_another_fmu_and_garbage_are_refused(load: Loader) -> None:
     road = begun(load, "RoadExcitation")
     data = road.to_bytes(road.state())
     own = begun(load, "Vehicle7DOF")
-    cut = own.to_bytes(own.state()).replace(b'"cells": [[', b'"cells": [[], [')
-    for garbage in (data, b"", b"not json", b"[1, 2]", b"{}", b"[" * 100_000, cut):
+    good = own.to_bytes(own.state())
+    assert b'"phase": [0.0' in good
+    damaged = [good[:-1], good[1:], good + b" ", good.replace(b'"phase": [0.0', b'"phase": [NaN')]
+    for garbage in (data, b"", b"not json", b"{}", b"[" * 100_000, *damaged):
         host = begun(load, "Vehicle7DOF")
         assert host.restore(host.from_bytes(garbage)) == FATAL
         assert "wanted one that this FMU has given" in " ".join(host.log)
+
+
+def test_the_state_of_an_instance_that_has_failed_is_refused(load: Loader) -> None:
+    """Restored, it would refuse every step without a word."""
+    failed, host = load("Vehicle7DOF"), begun(load, "Vehicle7DOF")
+    assert failed.start(m=-1.0) == FATAL
+    assert host.restore(host.from_bytes(failed.to_bytes(failed.state()))) == FATAL
+    assert "that of an instance that has failed" in " ".join(host.log)
 
 
 def test_200_lives_in_one_process_leave_nothing_behind(dist: Path, tmp_path: Path) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shutil
+import tempfile
 import zipfile
 from collections.abc import Callable
 from dataclasses import replace
@@ -99,6 +100,46 @@ def test_a_link_that_leads_out_of_the_system_is_refused_and_one_within_it_is_fol
     fmu.unlink()
     fmu.symlink_to(dist / "Vehicle7DOF.fmu")
     with pytest.raises(InputError, match=r"links that lead elsewhere: resources/Vehicle7DOF\.fmu"):
+        simulate(SHORT, unpacked)
+
+
+def test_a_component_may_have_any_name(system: Path, unpacked: Path) -> None:
+    """PythonFMU's library ends the process if such a name gets into a path."""
+    structure = unpacked / "SystemStructure.ssd"
+    text = structure.read_text(encoding="utf-8").replace('"vehicle"', '"../Jürgens #1 (50%)"')
+    structure.write_text(text, encoding="utf-8")
+    named, plain = simulate(SHORT, unpacked), simulate(SHORT, system)
+    np.testing.assert_array_equal(named.trajectory.values, plain.trajectory.values)
+
+
+@pytest.mark.parametrize("name", ["a#1", "50%", "Jürgen", "it's"])
+def test_a_temporary_folder_that_the_library_cannot_bear_is_refused(
+    system: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str
+) -> None:
+    (tmp_path / name).mkdir()
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path / name))
+    with pytest.raises(InputError, match="set TMPDIR to a plain one"):
+        simulate(SHORT, system)
+
+
+@pytest.mark.parametrize(
+    ("kind", "end", "name", "lacking"),
+    [
+        ("output", "start", "A", r"road\.A \(output\)"),  # a parameter of its FMU
+        ("input", "end", "tyre_fl.load", r"vehicle\.tyre_fl\.load \(input\)"),  # not there at all
+        ("input", "end", "m", r"vehicle\.m \(input\)"),
+    ],
+)
+def test_connectors_that_are_not_what_the_fmu_says_are_refused(
+    unpacked: Path, kind: str, end: str, name: str, lacking: str
+) -> None:
+    structure = unpacked / "SystemStructure.ssd"
+    text = structure.read_text(encoding="utf-8")
+    for place in (f'name="h_fl" kind="{kind}"', f'{end}Connector="h_fl"'):
+        assert text.count(place) == 1
+        text = text.replace(place, place.replace("h_fl", name))
+    structure.write_text(text, encoding="utf-8")
+    with pytest.raises(InputError, match=f"its FMUs lack these of its connectors: {lacking}$"):
         simulate(SHORT, unpacked)
 
 

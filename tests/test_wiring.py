@@ -111,7 +111,9 @@ def refused(folder: Path, text: str) -> list[tuple[int, str]]:
         (WIRE, WIRE + "<ssd:Connection/>", None, "not an output"),
         ('name="controller"', 'name="road"', 'name="road" type="application/x-fmu-sharedlibrary" source="resources/L',
          r"component 'road' stands there twice, first in line \d+"),
-        ('name="controller"', 'name="../../escaped"', 'name="../../escaped"', "a component is called '../../escaped'"),
+        ('name="controller"', 'name=""', 'name="" type', "a component has no name"),
+        ('<ssd:Connector name="force_rl" kind="input">', '<ssd:Connector name="force_rl" kind="output"/>'
+         '<ssd:Connector name="force_rl" kind="input">', None, "the connector vehicle.force_rl stands there twice"),
         ("resources/Lqr", "/resources/Lqr", "/resources/Lqr", "wanted the path of an FMU in the archive as source"),
         ("resources/Lqr", "../Lqr", "../Lqr", "wanted the path of an FMU in the archive as source"),
         ('source="resources/LqrController.fmu"', "", '"controller" type', "wanted the path of an FMU .* got ''"),
