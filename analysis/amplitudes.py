@@ -108,7 +108,9 @@ def equilibria(equations: AmplitudeEquations) -> list[Equilibrium]:
                 r, total = np.sqrt(squares), mu + C @ squares
                 jacobian = np.diag(total.real) + 2.0 * np.outer(r, r) * C.real
                 found.append(
-                    Equilibrium(amplitudes=r, frequencies=beta + total.imag, growth=np.linalg.eigvals(jacobian))
+                    Equilibrium(
+                        amplitudes=r, frequencies=beta + total.imag, growth=np.linalg.eigvals(jacobian).astype(complex)
+                    )
                 )
     return found
 
@@ -144,7 +146,7 @@ def steady_states(equations: AmplitudeEquations, starts: list[Complex]) -> list[
             S = S - step
             if np.abs(step).max() <= 1e-13 * max(1e-300, float(np.abs(S).max())):
                 if not any(np.abs(S - other).max() <= 1e-8 * np.abs(S).max() for other, _, _ in found):
-                    found.append((S, np.linalg.eigvals(slope), delta))
+                    found.append((S, np.linalg.eigvals(slope).astype(complex), delta))
                 break
     return found
 
