@@ -67,7 +67,21 @@ def _parser() -> argparse.ArgumentParser:
     verb = verbs.add_parser("audit", help="audit the equations and claims of the paper; needs no run")
     verb.add_argument("-o", "--out", type=Path, metavar="DIR", help="also write audit.md, audit.json and figures there")
     verb.set_defaults(do=_audit)
+
+    verb = verbs.add_parser(
+        "resonances", help="how near the car's modes and road are to resonance, and what detunes them"
+    )
+    verb.add_argument("scenario", nargs="?", default="sine", help=f"{scenario} (default: sine)")
+    verb.add_argument("--scan", metavar="PARAMETER", help="vary speed, c2/c1, Jy or b/a from half to twice its value")
+    verb.add_argument("-o", "--out", type=Path, metavar="DIR", help="folder for the table and the map of the scan")
+    verb.set_defaults(do=_resonances)
     return parser
+
+
+def _resonances(options: argparse.Namespace) -> int:
+    from .resonance_scan import command
+
+    return command(options.scenario, options.scan, options.out)
 
 
 def _simulate(options: argparse.Namespace) -> int:
