@@ -75,7 +75,20 @@ def _parser() -> argparse.ArgumentParser:
     verb.add_argument("--scan", metavar="PARAMETER", help="vary speed, c2/c1, Jy or b/a from half to twice its value")
     verb.add_argument("-o", "--out", type=Path, metavar="DIR", help="folder for the table and the map of the scan")
     verb.set_defaults(do=_resonances)
+
+    verb = verbs.add_parser(
+        "spatial", help="how much energy the nonlinear terms move between the car's modes, and where"
+    )
+    verb.add_argument("scenario", nargs="?", default="fourier-fl", help=f"{scenario} (default: fourier-fl)")
+    verb.add_argument("-o", "--out", type=Path, metavar="DIR", help="folder for the table of the scan")
+    verb.set_defaults(do=_spatial)
     return parser
+
+
+def _spatial(options: argparse.Namespace) -> int:
+    from .spatial_scan import command
+
+    return command(options.scenario, options.out)
 
 
 def _resonances(options: argparse.Namespace) -> int:
@@ -147,8 +160,11 @@ def _simulate_counterpart(scenario: Scenario, run: Run, folder: Path) -> None:
 def _judge(run: Run, folder: Path) -> int:
     """Check, write findings.json, print a line for each; 0 if all hold, 1 if not."""
     from .check import check
+    from .run_averaging import why_not_averaged
 
     findings = check(run)
+    if reason := why_not_averaged(run):
+        print(f"averaging is not applied: {reason}", file=sys.stderr)
     text = json.dumps([f.as_json() for f in findings], indent=1, ensure_ascii=False) + "\n"
     write_whole(folder / FINDINGS, text.encode())
     for f in findings:

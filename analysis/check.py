@@ -13,6 +13,7 @@ from .energy import balance
 from .errors import InputError
 from .findings import Finding
 from .reference import car_of, integrate, road_of
+from .run_averaging import averaged_findings
 from .trajectory import Array, Run
 
 # Largest deviation and energy residual of a run at H = 1 ms, rounded up, and their orders in H (tests measure them).
@@ -29,7 +30,7 @@ def check(run: Run) -> list[Finding]:
     """Findings on a run: it is a motion of (3.1)–(3.7), and its energy balances. Raises InputError for `lacking`."""
     if missing := lacking(run):
         raise InputError(f"the run cannot be checked: it lacks the columns {', '.join(missing)}")
-    return [_is_a_motion(run), _energy_balances(run)]
+    return [_is_a_motion(run), _energy_balances(run), *averaged_findings(run, _tolerance(DEVIATION, run))]
 
 
 def lacking(run: Run) -> list[str]:

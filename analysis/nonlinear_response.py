@@ -10,8 +10,10 @@ from scipy.integrate import solve_ivp
 
 from .errors import InputError
 from .polynomials import Array
-from .signals import Signal, constant
+from .signals import Piece, Signal, constant
 from .standard_form import StandardForm
+
+SMALL = 1e-3  # m, rad: of motions smaller than this the error is not relative any more
 
 
 def nonlinear_response(
@@ -24,17 +26,17 @@ def nonlinear_response(
     w = signal or constant([0.0] * form.B.shape[1], float(t[0]))
     x, result = np.asarray(x0, dtype=float), np.empty((len(form.A), len(t)))
     ends = [*w.edges[1:], np.inf]
-    size = max(float(np.abs(x).max()), 1e-3)
     for (piece, mask), end in zip(w.spans(t), ends, strict=True):
         stop = min(end, float(t[-1]))
         if stop < piece.begin:
             break
 
-        def rate(time: float, y: Array, piece: object = piece) -> list[float]:
-            return [float(v) for v in form.equations(y.tolist(), piece(time).tolist(), math.sin, math.cos)]  # type: ignore[operator]
+        def rate(time: float, y: Array, piece: Piece = piece) -> list[float]:
+            inputs = (piece.amplitudes @ np.exp(piece.exponents * (time - piece.begin))).real
+            return [float(v) for v in form.equations(y.tolist(), inputs.tolist(), math.sin, math.cos)]
 
         at = np.union1d(t[mask], [stop])
-        solution = solve_ivp(rate, (piece.begin, stop), x, "DOP853", at, rtol=rtol, atol=1e-2 * rtol * size)
+        solution = solve_ivp(rate, (piece.begin, stop), x, "DOP853", at, rtol=rtol, atol=rtol * SMALL)
         if not solution.success:
             raise InputError(f"from t = {piece.begin:g} s the motion cannot be integrated: {solution.message}")
         result[:, mask], x = solution.y[:, : np.count_nonzero(mask)], solution.y[:, -1]

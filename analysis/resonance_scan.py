@@ -93,8 +93,8 @@ def command(scenario: str, scanned: str | None, out: Path | None) -> int:
     print("\n".join(lines(table_of(parameters), parameters)))
     if scanned is None:
         if out:
-            _folder(out)
-            write_whole(out / "resonances.csv", _csv(_rows(table_of(parameters).rows)))
+            output_folder(out)
+            write_whole(out / "resonances.csv", as_csv(_rows(table_of(parameters).rows)))
             print(f"{out / 'resonances.csv'}: written")
         return 0
     result = scan(parameters, scanned, POINTS)
@@ -102,9 +102,9 @@ def command(scenario: str, scanned: str | None, out: Path | None) -> int:
     if out:
         from .resonance_figure import draw
 
-        _folder(out)
+        output_folder(out)
         stem = f"resonances-{scanned.replace('/', '-')}"
-        write_whole(out / f"{stem}.csv", _csv(_scan_rows(result)))
+        write_whole(out / f"{stem}.csv", as_csv(_scan_rows(result)))
         write_whole(out / f"{stem}.svg", draw(result))
         print(f"{out / stem}.csv, .svg: written")
     return 0
@@ -179,7 +179,7 @@ def scan_lines(result: Scan) -> list[str]:
 
 
 # ------------------------------------------------------------------ files
-def _folder(out: Path) -> None:
+def output_folder(out: Path) -> None:
     try:
         out.mkdir(parents=True, exist_ok=True)
     except OSError as error:
@@ -213,7 +213,7 @@ def _scan_rows(result: Scan) -> list[list[Any]]:
     return [heads, *rows]
 
 
-def _csv(rows: list[list[Any]]) -> bytes:
+def as_csv(rows: list[list[Any]]) -> bytes:
     text = io.StringIO()
     csv.writer(text, lineterminator="\n").writerows(rows)
     return text.getvalue().encode()
