@@ -31,16 +31,10 @@ class Stretch:
 
     t: Array
     x: Array
+    amplitudes: Complex  # s (14, T): what is left of ξ without the forced motion, turned back by β
     form: StandardForm
     piece: Piece | None
     equations: AmplitudeEquations
-
-    @property
-    def amplitudes(self) -> Complex:
-        """The run's modal amplitudes s (14, T): what is left of ξ without the forced motion, turned back by β."""
-        w, m = self.equations.waves, self.equations.modes
-        free = m.K_inverse @ self.x - w.forced @ w.at(self.t)
-        return free * np.exp(-1j * np.multiply.outer(m.beta, self.t))
 
     @property
     def left_out(self) -> float:
@@ -66,14 +60,11 @@ def stretch_of(run: Run) -> Stretch:
     if len(t) < FEWEST:
         raise InputError(f"the road changes its form until {signal.edges[-1]:g} s, and {len(t)} rows come after that")
     last = signal.pieces[-1]
-    form = car_form(car_of(run.parameters), order=3)
-    found = Stretch(
-        t=t,
-        x=run.trajectory.columns([q.name for q in STATES])[-len(t) :].T,
-        form=form,
-        piece=last if np.any(last.amplitudes) else None,
-        equations=average(form, last if np.any(last.amplitudes) else None),
-    )
+    piece, form = last if np.any(last.amplitudes) else None, car_form(car_of(run.parameters), order=3)
+    equations = average(form, piece)
+    x, m, w = run.trajectory.columns([q.name for q in STATES])[-len(t) :].T, equations.modes, equations.waves
+    turned = (m.K_inverse @ x - w.forced @ w.at(t)) * np.exp(-1j * np.multiply.outer(m.beta, t))
+    found = Stretch(t=t, x=x, amplitudes=turned, form=form, piece=piece, equations=equations)
     if not found.left_out <= LARGEST * found.size:
         raise InputError(
             f"the motion is too large: averaging would leave out up to {found.left_out / found.size:.2g} of it"
@@ -96,7 +87,8 @@ def averaged_findings(run: Run, accuracy: float) -> list[Finding]:
         stretch = stretch_of(run)
     except InputError:
         return []
-    return [_envelope(stretch, accuracy), _condition(stretch), _resonance(stretch)]
+    forced = [_condition(stretch)] if stretch.piece else []
+    return [_envelope(stretch, accuracy), *forced, _resonance(stretch)]
 
 
 def _envelope(stretch: Stretch, accuracy: float) -> Finding:
@@ -127,8 +119,8 @@ def _condition(stretch: Stretch) -> Finding:
         expected=-1.0,
         tolerance=1.0,
         unit="1",
-        source=f"run.json; mode {k + 1}, margin of all {found.margin:.4g} 1/s, lost at {found.critical_scale.min():.3g} "
-        "times this road",
+        source=f"run.json; mode {k + 1}, margin of all {found.margin:.4g} 1/s, lost at "
+        f"{found.critical_scale.min():.3g} times this road",
     )
 
 
@@ -143,6 +135,6 @@ def _resonance(stretch: Stretch) -> Finding:
         expected=0.0,
         tolerance=LARGEST,
         unit="1",
-        source=f"run.json; strongest {strongest}; nearest in frequency {rows[0]}, {rows[0].detuning:.3g} rad/s; nearest "
-        f"with damping {damped}, {damped.distance:.3g} 1/s",
+        source=f"run.json; strongest {strongest}; nearest in frequency {rows[0]}, {rows[0].detuning:.3g} rad/s; "
+        f"nearest with damping {damped}, {damped.distance:.3g} 1/s",
     )
