@@ -15,7 +15,7 @@ from .errors import InputError
 from .findings import Finding
 from .modes import Complex
 from .polynomials import Array
-from .reference import car_of, road_parameters_of
+from .reference import car_of, road_parameters
 from .resonance import resonances
 from .signals import Piece
 from .standard_form import StandardForm
@@ -55,7 +55,7 @@ def stretch_of(run: Run) -> Stretch:
     """Where averaging applies. Raises InputError saying why it does not."""
     if np.any(run.trajectory.columns([q.name for q in FORCES])):
         raise InputError("the actuators act, and their forces are no part of the car's own equations")
-    signal = road_signal(road_parameters_of(run.parameters), float(run.trajectory.time[0]))
+    signal = road_signal(road_parameters(run.parameters), float(run.trajectory.time[0]))
     t = run.trajectory.time[run.trajectory.time >= signal.edges[-1]]
     if len(t) < FEWEST:
         raise InputError(f"the road changes its form until {signal.edges[-1]:g} s, and {len(t)} rows come after that")

@@ -10,7 +10,7 @@ from made_up_run import made_up_run
 
 from analysis.car import car_form, road_signal
 from analysis.nonlinear_response import nonlinear_response
-from analysis.reference import Parameters, car_of, road_parameters_of
+from analysis.reference import Parameters, car_of, road_parameters
 from analysis.run_averaging import averaged_findings, stretch_of, why_not_averaged
 from analysis.trajectory import Run, Trajectory
 from fmu_src.quantities import FORCES, STATES
@@ -23,7 +23,7 @@ def run_of(parameters: Parameters, *, end: float = 1.5, driven: Parameters | Non
     """A passive run from rest, of these parameters; moved in truth by those of `driven`."""
     truth = driven or parameters
     t = np.linspace(0.0, end, 301)
-    signal = road_signal(road_parameters_of(truth))
+    signal = road_signal(road_parameters(truth))
     x = nonlinear_response(car_form(car_of(truth), order=1), np.zeros(14), signal, t, rtol=1e-11).T
     names = tuple(q.name for q in (*STATES, *FORCES))
     trajectory = Trajectory(time=t, names=names, values=np.hstack([x, np.zeros((len(t), 4))]))
