@@ -94,7 +94,7 @@ def test_a_linear_car_spreads_the_energy_of_one_wheel_and_phi_changes_it_by_the_
 
     slope, bend = observed_order(change, [4.0, 2.0, 1.0])
     assert slope == pytest.approx(2.0, abs=0.05) and bend < 0.03
-    assert change(1.0) < 1e-3  # measured: see the README
+    assert change(1.0) < 1e-3
 
 
 def test_the_grid_holds_the_scenario_itself_and_the_command_writes_it(
