@@ -83,7 +83,34 @@ def _parser() -> argparse.ArgumentParser:
     verb = verbs.add_parser("verify", help="prove a certificate's claims anew")
     verb.add_argument("certificate", type=Path, metavar="CERT", help="certificate (JSON)")
     verb.set_defaults(do=_verify)
+
+    verb = verbs.add_parser(
+        "resonances", help="how near the car's modes and road are to resonance, and what detunes them"
+    )
+    verb.add_argument("scenario", nargs="?", default="sine", help=f"{scenario} (default: sine)")
+    verb.add_argument("--scan", metavar="PARAMETER", help="vary speed, c2/c1, Jy or b/a from half to twice its value")
+    verb.add_argument("-o", "--out", type=Path, metavar="DIR", help="folder for the table and the map of the scan")
+    verb.set_defaults(do=_resonances)
+
+    verb = verbs.add_parser(
+        "spatial", help="how much energy the nonlinear terms move between the car's modes, and where"
+    )
+    verb.add_argument("scenario", nargs="?", default="fourier-fl", help=f"{scenario} (default: fourier-fl)")
+    verb.add_argument("-o", "--out", type=Path, metavar="DIR", help="folder for the table of the scan")
+    verb.set_defaults(do=_spatial)
     return parser
+
+
+def _spatial(options: argparse.Namespace) -> int:
+    from .spatial_scan import command
+
+    return command(options.scenario, options.out)
+
+
+def _resonances(options: argparse.Namespace) -> int:
+    from .resonance_scan import command
+
+    return command(options.scenario, options.scan, options.out)
 
 
 def _simulate(options: argparse.Namespace) -> int:
@@ -149,8 +176,11 @@ def _simulate_counterpart(scenario: Scenario, run: Run, folder: Path) -> None:
 def _judge(run: Run, folder: Path) -> int:
     """Check, write findings.json, print a line for each; 0 if all hold, 1 if not."""
     from .check import check
+    from .run_averaging import why_not_averaged
 
     findings = check(run)
+    if reason := why_not_averaged(run):
+        print(f"averaging is not applied: {reason}", file=sys.stderr)
     text = json.dumps([f.as_json() for f in findings], indent=1, ensure_ascii=False) + "\n"
     write_whole(folder / FINDINGS, text.encode())
     for f in findings:

@@ -31,9 +31,9 @@ class Homogeneous:
         """Values (n, …) at y (variables, …), real or complex."""
         return np.tensordot(self.coefficients, np.prod(np.asarray(y)[self.monomials], axis=1), axes=1)
 
-    def jacobian(self, y: Array) -> Array:
-        """Derivatives (n, variables) at one point y (variables,)."""
-        result = np.zeros((len(self.coefficients), len(y)))
+    def jacobian(self, y: NDArray[Any]) -> NDArray[Any]:
+        """Derivatives (n, variables) at one point y (variables,), real or complex."""
+        result = np.zeros((len(self.coefficients), len(y)), np.result_type(self.coefficients, y, float))
         values = y[self.monomials]
         for place in range(self.degree):
             slopes = self.coefficients * np.prod(np.delete(values, place, axis=1), axis=1)

@@ -7,6 +7,9 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
+import analysis  # noqa: F401  (before numpy: it sets the number of threads)
+
+# isort: split
 import lagrangian
 import numpy as np
 import pytest

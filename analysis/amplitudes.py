@@ -1,0 +1,177 @@
+"""What the amplitude equations say: stability of the forced motion, critical amplitudes, equilibria (after (3.20))."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import combinations
+
+import numpy as np
+
+from .averaging import AmplitudeEquations
+from .errors import InputError
+from .modes import Complex
+from .polynomials import Array
+
+MOST_MODES = 12  # whose subsets are tried
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Stability:
+    """The condition Re(α_k + ε(A_k + B_k)) < 0, mode by mode (n,).
+
+    growth            : the left-hand side [1/s].
+    critical_scale    : factor on the input at which it becomes 0; inf if it never does.
+    critical_amplitude: |s_k| at which the mode's own cubic term cancels its decay; inf if it never does.
+    """
+
+    growth: Array
+    critical_scale: Array
+    critical_amplitude: Array
+
+    @property
+    def margin(self) -> float:
+        """Smallest decay rate [1/s]; the condition holds if > 0."""
+        return float(-self.growth.max())
+
+
+def stability(equations: AmplitudeEquations) -> Stability:
+    """The condition with its margins."""
+    alpha, linear = equations.modes.alpha, equations.linear
+    by_waves = _linear_by_waves(equations)
+    growth, own = alpha + linear.real, equations.cubic.real
+    half = own.shape[1]
+    return Stability(
+        growth=growth,
+        critical_scale=np.array([_first_root([a, *row[1:]]) for a, row in zip(alpha, by_waves.real, strict=True)]),
+        critical_amplitude=np.array([_amplitude(growth[k], own[k, k % half]) for k in range(len(growth))]),
+    )
+
+
+def _linear_by_waves(equations: AmplitudeEquations) -> Complex:
+    """Coefficients of s_k in s_k' (n, P) by the number of waves in them: they grow with that power of the input."""
+    n, most = equations.n, max((part.degree for part in equations.resonant), default=1)
+    result = np.zeros((n, max(most, 2)), complex)
+    for part, delta in zip(equations.resonant, equations.detunings, strict=True):
+        for column, row in enumerate(part.monomials.tolist()):
+            free = [i for i in row if i < n]
+            if len(free) == 1 and delta[free[0], column] == 0.0:
+                result[free[0], len(row) - 1] += part.coefficients[free[0], column]
+    return result
+
+
+def _first_root(coefficients: list[float]) -> float:
+    """Smallest positive root of Σ c_p κᵖ, inf if there is none."""
+    roots = np.roots(np.trim_zeros(np.array(coefficients), "b")[::-1])
+    real = roots[np.abs(roots.imag) <= 1e-9 * np.abs(roots)].real
+    return float(min(real[real > 0.0], default=np.inf))
+
+
+def _amplitude(growth: float, own: float) -> float:
+    return float(np.sqrt(-growth / own)) if growth * own < 0.0 else np.inf
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Equilibrium:
+    """Constant |s_k| (n/2,) of the modes, their frequencies [rad/s], and growth rates of small changes [1/s]."""
+
+    amplitudes: Array
+    frequencies: Array
+    growth: Complex
+
+    @property
+    def stable(self) -> bool:
+        return bool(np.all(self.growth.real < 0.0))
+
+
+def equilibria(equations: AmplitudeEquations) -> list[Equilibrium]:
+    """All constant amplitudes of s_k' = s_k (μ_k + Σ_j c_kj |s_j|²), modes at rest included, by the modes that move.
+
+    For each set of moving modes |s|² solves linear equations. Raises InputError if other resonant terms were kept (see
+    `steady_states`), or for more than MOST_MODES modes.
+    """
+    half = equations.n // 2
+    _only_trivial(equations)
+    if half > MOST_MODES:
+        raise InputError(f"equilibria: wanted at most {MOST_MODES} modes, got {half}")
+    mu = (equations.modes.alpha + equations.linear)[:half]
+    C, beta = equations.cubic[:half], equations.modes.beta[:half]
+    found = []
+    for size in range(half + 1):
+        for moving in combinations(range(half), size):
+            chosen = list(moving)
+            block = C.real[np.ix_(chosen, chosen)]
+            if size and np.linalg.matrix_rank(block) < size:
+                continue
+            squares = np.zeros(half)
+            squares[chosen] = np.linalg.solve(block, -mu.real[chosen])
+            if np.all(squares[chosen] > 0.0):
+                r, total = np.sqrt(squares), mu + C @ squares
+                jacobian = np.diag(total.real) + 2.0 * np.outer(r, r) * C.real
+                found.append(
+                    Equilibrium(
+                        amplitudes=r, frequencies=beta + total.imag, growth=np.linalg.eigvals(jacobian).astype(complex)
+                    )
+                )
+    return found
+
+
+def _only_trivial(equations: AmplitudeEquations) -> None:
+    """Raise InputError unless every resonant term is s_k, or s_k s_j s_(j + n/2)."""
+    n, half = equations.n, equations.n // 2
+    for part in equations.resonant:
+        for k, monomial, _ in part.entries():
+            free = [i for i in monomial if i < n]
+            rest = [i for i in free if i != k] + [k] * (free.count(k) - 1)
+            paired = len(rest) == 2 and abs(rest[0] - rest[1]) == half
+            if k not in free or (rest and not paired):
+                raise InputError(
+                    f"equilibria: wanted terms s_k and s_k s_j s_j+{half} alone, got s{free} in s_{k}'; use "
+                    "steady_states, or a smaller detuning"
+                )
+
+
+def steady_states(equations: AmplitudeEquations, starts: list[Complex]) -> list[tuple[Complex, Complex, Array]]:
+    """Amplitudes s_k = S_k exp(iδ_k t) locked to the input or to each other, found by Newton's method from `starts`.
+
+    Each start is (n/2,). Returns for each one found S (n,), the growth rates of small changes (n,) [1/s], and δ (n,)
+    [rad/s]. Raises InputError if no rotation δ makes the equations autonomous.
+    """
+    delta = _rotation(equations)
+    found: list[tuple[Complex, Complex, Array]] = []
+    for start in starts:
+        S = np.concatenate([start, np.conj(start)])
+        for _ in range(60):
+            value, slope = _rotating(equations, delta, S)
+            step = np.linalg.solve(slope, value)
+            S = S - step
+            if np.abs(step).max() <= 1e-13 * max(1e-300, float(np.abs(S).max())):
+                if not any(np.abs(S - other).max() <= 1e-8 * np.abs(S).max() for other, _, _ in found):
+                    found.append((S, np.linalg.eigvals(slope).astype(complex), delta))
+                break
+    return found
+
+
+def _rotation(equations: AmplitudeEquations) -> Array:
+    """δ with δ_k − Σ δ_j = detuning for every term."""
+    n, half = equations.n, equations.n // 2
+    sign = np.vstack([np.eye(half), -np.eye(half)])
+    rows, values = [np.zeros(half)], [0.0]
+    for part, detunings in zip(equations.resonant, equations.detunings, strict=True):
+        for k, monomial in zip(*np.nonzero(part.coefficients), strict=True):
+            rows.append(sign[k] - sum((sign[i] for i in part.monomials[monomial] if i < n), np.zeros(half)))
+            values.append(detunings[k, monomial])
+    delta, *_ = np.linalg.lstsq(np.array(rows), np.array(values), rcond=None)
+    if not np.allclose(np.array(rows) @ delta, values, atol=1e-9 * max(1.0, float(np.abs(values).max()))):
+        raise InputError("steady states: the detunings of the kept terms fit no common rotation; wanted fewer of them")
+    return sign @ delta
+
+
+def _rotating(equations: AmplitudeEquations, delta: Array, S: Complex) -> tuple[Complex, Complex]:
+    """S' and its derivative in the rotating amplitudes."""
+    n = equations.n
+    z = np.concatenate([S, np.ones(len(equations.waves.frequencies))])
+    value = (equations.modes.alpha - 1j * delta) * S
+    slope = np.diag(equations.modes.alpha - 1j * delta)
+    for part in equations.resonant:
+        value, slope = value + part(z), slope + part.jacobian(z)[:, :n]
+    return value, slope

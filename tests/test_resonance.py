@@ -1,0 +1,163 @@
+"""Resonances: what the table holds, what it leaves out, and where a designer finds the nearest."""
+
+from __future__ import annotations
+
+import csv
+import time
+from collections.abc import Sequence
+from itertools import combinations_with_replacement
+from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree
+
+import numpy as np
+import pytest
+
+from analysis import resonance_scan
+from analysis.__main__ import main
+from analysis.car import car_form, road_signal
+from analysis.car_scans import VARIATIONS, variation
+from analysis.errors import InputError
+from analysis.modes import modes
+from analysis.resonance import Resonance, Resonances, remark_as_printed, resonances
+from analysis.resonance_scan import scan
+from analysis.signals import harmonic
+from analysis.standard_form import StandardForm, standard_form
+from fmu_src.quantities import PARAMETERS
+from fmu_src.road.profiles import RoadParameters
+from fmu_src.vehicle.parameters import Car
+
+
+def pair(ratio: float, power: int = 3, damping: float = 0.0) -> StandardForm:
+    """Oscillators of 1 and ratio [rad/s], coupled by x^power in the second and driven in the first."""
+
+    def equations(z: Sequence[Any], w: Sequence[Any], s: Any, c: Any) -> Sequence[Any]:
+        x, y, dx, dy = z
+        force = x * x * (x if power == 3 else 1.0)
+        return [dx, dy, -x - damping * dx + w[0], -(ratio**2) * y - damping * dy + force]
+
+    return standard_form(equations, ["x", "y", "x'", "y'"], 1, order=power, powers={power: 1})
+
+
+def row(table: Resonances, name: str) -> Resonance:
+    return next(r for r in table.rows if str(r) == name)
+
+
+def test_the_exact_resonance_comes_first_and_off_it_the_detuning_is_the_frequencies() -> None:
+    exact = resonances(pair(3.0))
+    assert str(exact.rows[0]) == "3β1 = β2" and exact.rows[0].detuning == pytest.approx(0.0, abs=1e-12)
+    assert exact.rows[0].in_print
+    near = row(resonances(pair(2.9)), "3β1 = β2")
+    assert near.detuning == pytest.approx(0.1) and near.relative == pytest.approx(0.1 / 2.9)
+    assert str(resonances(pair(2.0, power=2)).rows[0]) == "2β1 = β2"
+
+
+def test_only_terms_that_phi_has_occur() -> None:
+    table = resonances(pair(3.3))
+    assert [str(r) for r in table.occurring] == ["3β1 = β2", "β1 = β2"]  # of (x)³ in the second equation alone
+    assert row(table, "β1 = 3β2").coefficient == 0.0
+
+
+def test_damping_counts_in_the_distance() -> None:
+    """3 λ1 − λ2: with equal decay α the real part is 2 α."""
+    near = row(resonances(pair(3.0, damping=0.2)), "3β1 = β2")
+    lam = modes(pair(3.0, damping=0.2).A).eigenvalues
+    assert near.distance == pytest.approx(abs(3.0 * lam[0] - lam[1])) and near.distance > 0.19
+
+
+def test_every_term_is_counted_once_and_identities_are_those_of_the_papers_sum() -> None:
+    """Against a plain enumeration of s_a s_b s_c in s_k'."""
+    table, h = resonances(car_form(Car(), order=3), degrees=(3,)), 7
+    assert table.terms == 7 * len(list(combinations_with_replacement(range(14), 3)))
+    assert table.trivial == {0: h * h} and table.silent == 0
+    beta = modes(car_form(Car()).A).beta
+    detunings = []
+    for terms in combinations_with_replacement(range(14), 3):
+        for k in range(h):
+            counts = np.zeros(h, int)
+            for i in terms:
+                counts[i % h] += 1 if i < h else -1
+            counts[k] -= 1
+            if counts.min() < 0 < counts.max():
+                detunings.append(abs(counts @ beta[:h]) / np.gcd.reduce(counts))
+    np.testing.assert_allclose(
+        np.unique(np.round([r.detuning for r in table.rows], 9)), np.unique(np.round(detunings, 9)), atol=1e-8
+    )
+
+
+def test_waves_bring_external_resonances_and_their_own_identities() -> None:
+    table = resonances(pair(3.3), harmonic([1.0], 1.1).pieces[0])
+    names = [str(r) for r in table.rows]
+    assert "β1 = Ω" in names and "β2 = 3Ω" in names and "β1 + 2Ω = β2" in names
+    assert row(table, "β1 = Ω").detuning == pytest.approx(0.1)
+    assert row(table, "β2 = 3Ω").detuning == pytest.approx(0.0, abs=1e-12)
+    assert table.trivial == {0: 4, 2: 2}
+    assert row(table, "β2 = 3Ω").coefficient > 0.0  # the forced x³
+    assert row(table, "β1 = Ω").gain == 0.0  # direct excitation is linear
+
+
+def test_the_remark_as_printed_misses_what_counts() -> None:
+    """An odd system has no three-mode terms, and β_j + β_k = β_l + β_m is not in the remark."""
+    form = car_form(Car(), order=3)
+    table, lam = resonances(form), modes(form.A).eigenvalues
+    three, four = remark_as_printed(lam)
+    assert len(three.distance) == 28 * 7 and len(four.distance) == 84 * 7
+    i = int(np.argmin(four.detuning))
+    *summed, last = (four.indices[i] - 1).tolist()
+    assert four.distance[i] == pytest.approx(abs(lam[summed].sum() - lam[last]))
+    assert not any(r.coefficient for r in table.rows if sum(map(abs, r.modes)) == 3)
+    nearest = table.occurring[0]
+    assert not nearest.in_print and nearest.detuning < 0.3 * four.detuning.min()
+
+
+def test_modes_that_do_not_oscillate_take_no_part() -> None:
+    table = resonances(car_form(Car(b1=8000.0), order=3))
+    overdamped = np.count_nonzero(modes(car_form(Car(b1=8000.0)).A).beta[:7] == 0.0)
+    assert table.silent == overdamped > 0
+    assert all(not any(r.modes[7 - overdamped :]) for r in table.rows)
+
+
+def test_the_table_takes_milliseconds() -> None:
+    form = car_form(Car(), order=3)
+    piece = road_signal(RoadParameters(profile="sine")).pieces[-1]
+    times = []
+    for _ in range(5):
+        begin = time.perf_counter()
+        resonances(form, piece)
+        times.append(time.perf_counter() - begin)
+    assert min(times) < 0.2  # measured: 0.04 s
+
+
+@pytest.mark.parametrize("name", VARIATIONS)
+def test_a_variation_changes_what_it_says(name: str) -> None:
+    p: dict[str, float | str | bool] = {"a": 1.1, "v0": 12.0}
+    changed = variation(name).changed(p, 1.3)
+    assert variation(name).value(changed) == pytest.approx(1.3)
+    wheelbase = 1.1 + PARAMETERS["b"].start
+    if name == "b/a":
+        assert float(changed["a"]) + float(changed["b"]) == pytest.approx(wheelbase)
+    with pytest.raises(InputError, match="wanted one of speed, c2/c1, Jy, b/a"):
+        variation("colour")
+
+
+def test_a_scan_finds_the_speed_at_which_the_road_meets_a_mode() -> None:
+    result = scan({"profile": "sine", "v0": 11.0}, "speed", points=9)
+    assert result.values[4] == pytest.approx(11.0)
+    np.testing.assert_allclose(result.road, 2.0 * np.pi * result.values)
+    curve = result.curve(((0, 0, 0, 1, 0, 0, 0), -1), "detuning")
+    np.testing.assert_allclose(curve, np.abs(result.frequencies[:, 3] - result.road))
+
+
+def test_the_command_prints_and_writes(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(resonance_scan, "POINTS", 5)
+    assert main(["resonances", "bump", "-o", str(tmp_path)]) == 0
+    assert "no lasting waves" in capsys.readouterr().out
+    rows = list(csv.reader((tmp_path / "resonances.csv").read_text().splitlines()))
+    assert rows[0][0] == "equality" and len(rows) > 500
+    assert main(["resonances", "sine", "--scan", "c2/c1", "-o", str(tmp_path)]) == 0
+    assert "nearest in frequency" in capsys.readouterr().out
+    assert ElementTree.parse(tmp_path / "resonances-c2-c1.svg").getroot().tag.endswith("svg")
+    assert len((tmp_path / "resonances-c2-c1.csv").read_text().splitlines()) == 6
+    assert main(["resonances", "sine", "--scan", "colour"]) == 2
