@@ -78,6 +78,21 @@ class Series:
         return (self.modes.K @ self.modal(t)).real
 
 
+def partial_sums(terms: Array, epsilon: float = 1.0) -> Array:
+    """x⁽⁰⁾, x⁽⁰⁾ + ε x⁽¹⁾, … (orders, n, …): the approximations of order 0, 1, … from the terms (orders, n, …)."""
+    return np.cumsum([term * epsilon**k for k, term in enumerate(terms)], axis=0)
+
+
+def successive_ratios(modal: Complex) -> Array:
+    """sup |ξ⁽ᵏ⁺¹⁾| / sup |ξ⁽ᵏ⁾| (orders − 1,) over all coordinates and the times of ξ (orders, n, times).
+
+    The series is of use for |ε| well below the reciprocal of the last one, its practical radius; where ε stands for
+    the square of a size, as in an odd system, for sizes times less than the square root of that.
+    """
+    sizes = np.abs(modal).max(axis=(1, 2))
+    return sizes[1:] / sizes[:-1]
+
+
 def exact_series(form: StandardForm, modes: Modes, signal: Signal, x0: ArrayLike, order: int) -> Series:
     """The series up to εᵒʳᵈᵉʳ under the input of the signal, from x0 (n,) at its begin.
 
