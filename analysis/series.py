@@ -144,15 +144,25 @@ def forcings(form: StandardForm, modes: Modes, w: Any, orders: Sequence[Any], co
 def expansion(part: Homogeneous, y: Sequence[Any]) -> Callable[[int], Any]:
     """k → the coefficient of εᵏ in part(y[0] + ε y[1] + …); y may still grow between the calls."""
 
+    levels = []  # per place: the last factor of each distinct beginning of a monomial, and what it is multiplied with
+    before = np.zeros(len(part.monomials), np.intp)
+    for place in range(part.degree):
+        beginnings = part.monomials[:, : place + 1]
+        _, first, where = np.unique(beginnings, axis=0, return_index=True, return_inverse=True)
+        levels.append((beginnings[first, place], before[first]))
+        before = where.reshape(-1)
+    coefficients = np.zeros((len(part.coefficients), len(levels[-1][0])))
+    np.add.at(coefficients.T, before, part.coefficients.T)
+
     @cache
     def product(place: int, k: int) -> Any:
-        factors = part.monomials[:, place]
+        factors, earlier = levels[place]
         if place == 0:
             return y[k][factors]
-        values = [product(place - 1, k - j) * y[j][factors] for j in range(k + 1)]
+        values = [product(place - 1, k - j)[earlier] * y[j][factors] for j in range(k + 1)]
         return sum(values[1:], values[0])
 
-    return lambda k: part.coefficients @ product(part.degree - 1, k)
+    return lambda k: coefficients @ product(part.degree - 1, k)
 
 
 def _secular(order: int, begin: float, modes: Modes, resonances: Sequence[Resonance]) -> list[Secular]:
