@@ -21,7 +21,7 @@ from fmu_src.vehicle.parameters import Car
 from .polynomials import Array
 from .power_series import cos, sin, variables
 from .signals import Piece, Signal
-from .standard_form import Equations, Function, StandardForm, standard_form
+from .standard_form import Equations, Function, StandardForm, only, standard_form
 
 
 def car_form(car: Car, *, gain: Array | None = None, order: int = 5) -> StandardForm:
@@ -39,6 +39,11 @@ def exact_A(car: Car) -> list[list[Fraction]]:
     exact = SimpleNamespace(**{name: Fraction(repr(value)) for name, value in asdict(car).items()})
     rates = car_equations(exact, None)(variables(14, 1, Fraction(1)), [0] * 8, sin, cos)
     return [[Fraction(rate.terms.get((j,), 0)) for j in range(14)] for rate in rates]
+
+
+def without_cubic_stiffness(form: StandardForm) -> StandardForm:
+    """The car's form with R̄ and P̄ as §3.2 prints them: cubic only, and no monomials in the coordinates q alone."""
+    return only(form, lambda monomial: len(monomial) == 3 and max(monomial) >= 7)
 
 
 def car_equations(car: Any, gain: Array | None) -> Equations:
