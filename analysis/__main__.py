@@ -149,8 +149,12 @@ def _simulate_counterpart(scenario: Scenario, run: Run, folder: Path) -> None:
 def _judge(run: Run, folder: Path) -> int:
     """Check, write findings.json, print a line for each; 0 if all hold, 1 if not."""
     from .check import check
+    from .run_series import series_findings
 
-    findings = check(run)
+    of_series, reason = series_findings(run)
+    if reason:
+        print(f"the series in the small parameter is not compared with the run: {reason}", file=sys.stderr)
+    findings = [*check(run), *of_series]
     text = json.dumps([f.as_json() for f in findings], indent=1, ensure_ascii=False) + "\n"
     write_whole(folder / FINDINGS, text.encode())
     for f in findings:

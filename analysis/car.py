@@ -24,9 +24,12 @@ from .signals import Piece, Signal
 from .standard_form import Equations, Function, StandardForm, only, standard_form
 
 
-def car_form(car: Car, *, gain: Array | None = None, order: int = 5) -> StandardForm:
-    """The car: states x = (q, q̇) (14), inputs w = (h, ḣ) (8); with a gain (4, 14), under forces u = −gain x."""
-    return standard_form(car_equations(car, gain), [q.name for q in STATES], 8, order=order)
+def car_form(car: Car, *, gain: Array | None = None, forces: bool = False, order: int = 5) -> StandardForm:
+    """The car: states x = (q, q̇) (14), inputs w = (h, ḣ) (8); with a gain (4, 14), under forces u = −gain x.
+
+    forces : whether forces u at the struts are four inputs more, w = (h, ḣ, u) (12); they add to those of a gain.
+    """
+    return standard_form(car_equations(car, gain), [q.name for q in STATES], 12 if forces else 8, order=order)
 
 
 def actuators(car: Car) -> Array:
@@ -51,8 +54,10 @@ def car_equations(car: Any, gain: Array | None) -> Equations:
     rows = [] if gain is None else gain.tolist()
 
     def equations(x: Sequence[Any], w: Sequence[Any], sine: Function, cosine: Function) -> Sequence[Any]:
-        u = [sum((xi * -k for k, xi in zip(row, x, strict=True) if k), 0.0) for row in rows] or [0.0] * 4
-        accelerations, _, _ = equations_of_motion(car, sine, cosine)(x[:7], x[7:], u, w[:4], w[4:])
+        u = list(w[8:]) or [0.0] * 4
+        for i, row in enumerate(rows):
+            u[i] = sum((xi * -k for k, xi in zip(row, x, strict=True) if k), u[i])
+        accelerations, _, _ = equations_of_motion(car, sine, cosine)(x[:7], x[7:], u, w[:4], w[4:8])
         return [*x[7:], *accelerations]
 
     return equations
