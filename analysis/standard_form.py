@@ -85,9 +85,7 @@ def perturbed(form: StandardForm, perturbation: Equations, *, order: int = 3) ->
         values = zip(form.equations(x, w, sine, cosine), perturbation(x, w, sine, cosine), strict=True)
         return [f + g for f, g in values]
 
-    return replace(
-        form, terms={**form.terms, 1: (*form.terms.get(1, ()), *added.values())}, equations=both
-    )
+    return replace(form, terms={**form.terms, 1: (*form.terms.get(1, ()), *added.values())}, equations=both)
 
 
 def only(form: StandardForm, keep: Callable[[Monomial], bool]) -> StandardForm:
@@ -112,6 +110,4 @@ def _expanded(equations: Equations, states: int, inputs: int, order: int) -> dic
     found = parts([value if isinstance(value, PowerSeries) else y[0] * 0 + value for value in values])
     if 0 in found:
         raise InputError(f"x' = F(x, w): wanted F(0, 0) = 0, got {found[0].coefficients[:, 0].tolist()}")
-    return {
-        degree: replace(part, coefficients=part.coefficients.astype(float)) for degree, part in found.items()
-    }
+    return {degree: replace(part, coefficients=part.coefficients.astype(float)) for degree, part in found.items()}

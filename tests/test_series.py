@@ -15,12 +15,10 @@ from analysis.car import car_form, road_signal, without_cubic_stiffness
 from analysis.errors import InputError
 from analysis.exponentials import Exponentials, forced_modes, time_scales
 from analysis.modes import modes
-from analysis.reference import integrate
 from analysis.sampled_series import sampled_series
 from analysis.series import Series, common_rates, exact_series, partial_sums, successive_ratios
 from analysis.signals import Piece, Signal, harmonic
 from analysis.standard_form import StandardForm, only, perturbed, standard_form
-from fmu_src.quantities import PARAMETERS
 from fmu_src.road.profiles import RoadParameters
 from fmu_src.vehicle.parameters import Car
 
@@ -262,3 +260,110 @@ def test_a_forced_duffing_settles_where_harmonic_balance_says() -> None:
         )
         assert slope == pytest.approx(order + 1, abs=0.1)
         assert bend < 0.05
+
+
+# ---------------------------------------------------------------------------------------------------- any input
+def test_the_quadrature_is_of_order_5_and_tends_to_the_exact_sums() -> None:
+    form, w = car_form(Car(), order=3), road_signal(RoadParameters(tau0=0.02))
+    linear = modes(form.A)
+    t = np.linspace(0.0, 0.8, 2999)  # within steps
+    exact = exact_series(form, linear, w, np.zeros(14), 1).physical(t)
+    sizes = [0.005, 0.0025, 0.00125]  # with the corners of the road on edges
+    grids = {H: np.linspace(0.0, 0.8, round(0.8 / H) + 1) for H in sizes}
+    found = {H: sampled_series(form, linear, w, grid, np.zeros(14), 1).physical(t) for H, grid in grids.items()}
+    for k in (0, 1):
+        slope, bend = observed_order(lambda H, k=k: float(np.abs(found[H][k] - exact[k]).max()), sizes)
+        assert slope == pytest.approx(5.0, abs=0.2)
+        assert bend < 0.05
+    assert np.abs(found[0.00125] - exact).max() < 1e-9 * np.abs(exact).max()
+
+
+def test_the_first_order_of_cubics_is_exact_even_where_it_is_stiff() -> None:
+    """x' = −λx + t³ in two steps of unequal length, λh up to 10⁴, where a Runge–Kutta method would blow up."""
+    for rate in (1e-3, 1.0, 1e4):
+        form = standard_form(lambda x, w, s, c, rate=rate: [x[0] * -rate + w[0]], ["x"], 1)
+        grid, t = np.array([0.0, 0.3, 1.0]), np.linspace(0.0, 1.0, 11)
+        found = sampled_series(form, modes(form.A), lambda t: t[None] ** 3, grid, [1.0], 0).physical(t)[0, 0]
+        exact = [
+            float(
+                mpmath.exp(-rate * s) + mpmath.mpf(s) ** 4 / 4 * mpmath.exp(-rate * s) * mpmath.hyp1f1(4, 5, rate * s)
+            )
+            for s in t.tolist()
+        ]
+        np.testing.assert_allclose(found, exact, rtol=1e-11)
+
+
+def test_successive_terms_say_how_far_the_series_reaches() -> None:
+    """x' = −x + ε x²: x⁽ᵏ⁾ = e^(−t) (1 − e^(−t))ᵏ, so sup x⁽ᵏ⁺¹⁾/sup x⁽ᵏ⁾ = ((k+1)/(k+2))^(k+2) (k+1)/… → 1, ε < 1."""
+    form = standard_form(lambda x, w, s, c: [-x[0] + x[0] * x[0]], ["x"], 0)
+    t = np.linspace(0.0, 5.0, 20001)
+    found = exact_series(form, modes(form.A), NO_INPUT, [1.0], 6)
+    expected = np.exp(-t) * (1.0 - np.exp(-t)) ** np.arange(7)[:, None]
+    np.testing.assert_allclose(found.physical(t)[:, 0], expected, atol=1e-12)
+    sups = [k**k / (k + 1.0) ** (k + 1) for k in range(7)]
+    np.testing.assert_allclose(successive_ratios(found.modal(t)), np.divide(sups[1:], sups[:-1]), rtol=1e-6)
+
+
+# ---------------------------------------------------------------------------------------------------- the car
+TIMES = np.linspace(0.0, 1.0, 201)
+AMPLITUDES = [0.2, 0.15, 0.1]  # m
+CARS = {"default": Car(), "damped tyres": Car(bp1=150.0, bp2=170.0, Jz=700.0)}
+
+
+def whole(car: Car, amplitude: float) -> Any:
+    """The full equations on the bump, integrated tightly."""
+    return integrated(car_form(car), 1.0, road_signal(RoadParameters(A=amplitude)), [0.0] * 14, TIMES)
+
+
+def relative(error: Any, of: Any) -> float:
+    """Largest difference, over each state's maximum."""
+    return float((np.abs(error) / np.abs(of).max(axis=1, keepdims=True)).max())
+
+
+@pytest.mark.parametrize("car", CARS.values(), ids=CARS)
+def test_the_cars_truncation_error_falls_with_amplitude_at_orders_3_5_7_and_9(car: Car) -> None:
+    """Against the full equations; x⁽ᵏ⁾ of a road of 1 m, times A^(2k+1), is that of the amplitude A.
+
+    Terms of degree 3 (cubic stiffness and P among them) carry order 1, of degree 5 order 2, of degree 7 order 3.
+    """
+    form, grid = car_form(car, order=7), np.linspace(0.0, 1.0, 2001)
+    w = road_signal(RoadParameters(A=1.0))
+    terms = sampled_series(form, modes(form.A), w, grid, np.zeros(14), 3).physical(TIMES)
+    exact = {A: whole(car, A) for A in AMPLITUDES}
+    for order in range(4):
+
+        def error(A: float, order: int = order) -> float:
+            return A * relative(exact[A] - A * partial_sums(terms, A * A)[order], exact[A])
+
+        slope, bend = observed_order(error, AMPLITUDES)
+        assert slope == pytest.approx(2 * order + 3, abs=0.1)
+        assert bend < 0.02
+
+
+def test_exact_sums_and_quadrature_are_two_ways_to_the_same_terms() -> None:
+    """Up to order 2, from a start off rest, with pieces down to 1 ms, on which the sums nearly cancel."""
+    form = car_form(CARS["damped tyres"])
+    w, linear = road_signal(RoadParameters(tau0=0.001)), modes(form.A)
+    x0, grid = np.linspace(-0.01, 0.01, 14), np.linspace(0.0, 0.8, 1601)
+    exact = exact_series(form, linear, w, x0, 2).physical(TIMES[:161])
+    found = sampled_series(form, linear, w, grid, x0, 2).physical(TIMES[:161])
+    for k, tolerance in enumerate([1e-11, 1e-9, 1e-9]):
+        np.testing.assert_allclose(found[k], exact[k], atol=tolerance * np.abs(exact[k]).max())
+
+
+@pytest.mark.parametrize(
+    ("left_out", "least", "most"), [("nothing", 100.0, 200.0), ("P", 2.0, 20.0), ("cubic stiffness", 0.9, 1.1)]
+)
+def test_what_the_first_correction_gains(left_out: str, least: float, most: float) -> None:
+    """The paper's own R̄ lacks c_ijkl q q q and gains nothing; without P a part of the gain is lost."""
+    car, A = Car(), 0.1
+    form = car_form(car)
+    kept = {
+        "nothing": form,
+        "P": only(form, lambda monomial: max(monomial) < 14),
+        "cubic stiffness": without_cubic_stiffness(form),
+    }[left_out]
+    terms = exact_series(kept, modes(form.A), road_signal(RoadParameters(A=A)), np.zeros(14), 1).physical(TIMES)
+    exact = whole(car, A)
+    errors = [relative(exact - sums, exact) for sums in partial_sums(terms)]
+    assert least < errors[0] / errors[1] < most
