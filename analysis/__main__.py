@@ -151,10 +151,11 @@ def _judge(run: Run, folder: Path) -> int:
     from .check import check
     from .run_series import series_findings
 
+    findings = check(run)
     of_series, reason = series_findings(run)
     if reason:
         print(f"the series in the small parameter is not compared with the run: {reason}", file=sys.stderr)
-    findings = [*check(run), *of_series]
+    findings += of_series
     text = json.dumps([f.as_json() for f in findings], indent=1, ensure_ascii=False) + "\n"
     write_whole(folder / FINDINGS, text.encode())
     for f in findings:

@@ -9,6 +9,7 @@ from fmu_src.quantities import FORCES, STATES
 from .car import car_form
 from .check import own_error
 from .discrepancy import scales
+from .errors import InputError
 from .findings import Finding
 from .modes import modes
 from .polynomials import Array
@@ -19,13 +20,20 @@ from .series import partial_sums, successive_ratios
 from .trajectory import Run
 
 ORDERS = 3  # that are compared with the run; one more term is formed, to know what the last one leaves
+MOST_ROWS = 20_000  # of the run that are compared, from its first
 USEFUL = 0.5  # ratio of successive terms from which on a few of them say nothing about the motion
 
 
 def series_findings(run: Run) -> tuple[list[Finding], str]:
     """A finding for each order of the series under the exported road and forces; if there is none, why."""
-    x = run.trajectory.columns([q.name for q in STATES]).T
-    terms, ratio = _terms(run, x[:, 0])
+    t = run.trajectory.time[:MOST_ROWS]
+    if len(t) < 2:
+        return [], "it has one row only"
+    x = run.trajectory.columns([q.name for q in STATES])[:MOST_ROWS].T
+    try:
+        terms, ratio = _terms(run, t, x[:, 0])
+    except InputError as error:  # no modes
+        return [], str(error)
     if not np.abs(terms[0]).any():
         return [], "the car stands still"
     if not ratio < USEFUL:
@@ -34,6 +42,7 @@ def series_findings(run: Run) -> tuple[list[Finding], str]:
     errors = [_sup((x - approximation) / scale) for approximation in partial_sums(terms)[:ORDERS]]
     sizes = [_sup(term / scale) for term in terms]
     tails = [sum(sizes[k + 2 :]) + sizes[-1] * ratio / (1.0 - ratio) for k in range(ORDERS)]
+    table = f"errors of order 0, 1, …: {', '.join(f'{e:.2g}' for e in errors)}; factor between the terms {ratio:.2g}"
     return [
         Finding(
             claim=f"the series to order {k} leaves of the run what its next term says: largest difference, over each "
@@ -43,25 +52,24 @@ def series_findings(run: Run) -> tuple[list[Finding], str]:
             expected=sizes[k + 1],
             tolerance=tails[k] + own_error(run),
             unit="1",
-            source=f"trajectory.csv, all states; errors of order 0, 1, …: {', '.join(f'{e:.2g}' for e in errors)}; "
-            f"factor between the terms {ratio:.2g}",
+            source=f"trajectory.csv, all states, to {t[-1]:g} s; {table}",
         )
         for k in range(ORDERS)
     ], ""
 
 
-def _terms(run: Run, x0: Array) -> tuple[Array, float]:
-    """x⁽ᵏ⁾ (ORDERS + 1, 14, rows) at the rows' times from x0, and the largest ratio of successive terms."""
-    trajectory = run.trajectory
+@np.errstate(over="ignore", invalid="ignore")  # of motions that are far too large
+def _terms(run: Run, t: Array, x0: Array) -> tuple[Array, float]:
+    """x⁽ᵏ⁾ (ORDERS + 1, 14, len(t)) at the rows' times t from x0, and the largest ratio of successive terms."""
     form = car_form(car_of(run.parameters), forces=True, order=2 * ORDERS + 1)
-    road, forces = recorded_road(trajectory), trajectory.columns([q.name for q in FORCES])
+    road, forces = recorded_road(run.trajectory), run.trajectory.columns([q.name for q in FORCES])
 
-    def w(t: Array) -> Array:
-        row = np.searchsorted(trajectory.time, t, side="right") - 1
-        return np.concatenate([road(t).T, road(t, 1).T, forces[row].T])
+    def w(times: Array) -> Array:
+        row = np.searchsorted(t, times, side="right") - 1
+        return np.concatenate([road(times).T, road(times, 1).T, forces[row].T])
 
-    found = sampled_series(form, modes(form.A), w, trajectory.time, x0, ORDERS)
-    xi = found.modal(trajectory.time)
+    found = sampled_series(form, modes(form.A), w, t, x0, ORDERS)
+    xi = found.modal(t)
     return (found.modes.K @ xi).real, float(successive_ratios(xi).max()) if xi[0].any() else 0.0
 
 

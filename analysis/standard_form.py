@@ -79,7 +79,8 @@ def perturbed(form: StandardForm, perturbation: Equations, *, order: int = 3) ->
 
     Raises InputError if G(0, 0) ≠ 0.
     """
-    added = _expanded(perturbation, *form.B.shape, order)
+    states, inputs = form.B.shape
+    added = _expanded(perturbation, states, inputs, order)
 
     def both(x: Sequence[Any], w: Sequence[Any], sine: Function, cosine: Function) -> Sequence[Any]:
         values = zip(form.equations(x, w, sine, cosine), perturbation(x, w, sine, cosine), strict=True)

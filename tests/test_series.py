@@ -255,9 +255,11 @@ def test_a_forced_duffing_settles_where_harmonic_balance_says() -> None:
 
     exact = {epsilon: balance(epsilon) for epsilon in (0.4, 0.2, 0.1)}
     for order in (0, 1, 2):
-        slope, bend = observed_order(
-            lambda e, order=order: float(np.abs(partial_sums(terms[:, 0], e)[order] - exact[e]).max()), list(exact)
-        )
+
+        def error(epsilon: float, order: int = order) -> float:
+            return float(np.abs(partial_sums(terms[:, 0], epsilon)[order] - exact[epsilon]).max())
+
+        slope, bend = observed_order(error, list(exact))
         assert slope == pytest.approx(order + 1, abs=0.1)
         assert bend < 0.05
 
@@ -272,7 +274,11 @@ def test_the_quadrature_is_of_order_5_and_tends_to_the_exact_sums() -> None:
     grids = {H: np.linspace(0.0, 0.8, round(0.8 / H) + 1) for H in sizes}
     found = {H: sampled_series(form, linear, w, grid, np.zeros(14), 1).physical(t) for H, grid in grids.items()}
     for k in (0, 1):
-        slope, bend = observed_order(lambda H, k=k: float(np.abs(found[H][k] - exact[k]).max()), sizes)
+
+        def error(H: float, k: int = k) -> float:
+            return float(np.abs(found[H][k] - exact[k]).max())
+
+        slope, bend = observed_order(error, sizes)
         assert slope == pytest.approx(5.0, abs=0.2)
         assert bend < 0.05
     assert np.abs(found[0.00125] - exact).max() < 1e-9 * np.abs(exact).max()
@@ -281,7 +287,11 @@ def test_the_quadrature_is_of_order_5_and_tends_to_the_exact_sums() -> None:
 def test_the_first_order_of_cubics_is_exact_even_where_it_is_stiff() -> None:
     """x' = −λx + t³ in two steps of unequal length, λh up to 10⁴, where a Runge–Kutta method would blow up."""
     for rate in (1e-3, 1.0, 1e4):
-        form = standard_form(lambda x, w, s, c, rate=rate: [x[0] * -rate + w[0]], ["x"], 1)
+
+        def lag(x: Sequence[Any], w: Sequence[Any], sine: Any, cosine: Any, rate: float = rate) -> Sequence[Any]:
+            return [x[0] * -rate + w[0]]
+
+        form = standard_form(lag, ["x"], 1)
         grid, t = np.array([0.0, 0.3, 1.0]), np.linspace(0.0, 1.0, 11)
         found = sampled_series(form, modes(form.A), lambda t: t[None] ** 3, grid, [1.0], 0).physical(t)[0, 0]
         exact = [
@@ -294,7 +304,7 @@ def test_the_first_order_of_cubics_is_exact_even_where_it_is_stiff() -> None:
 
 
 def test_successive_terms_say_how_far_the_series_reaches() -> None:
-    """x' = −x + ε x²: x⁽ᵏ⁾ = e^(−t) (1 − e^(−t))ᵏ, so sup x⁽ᵏ⁺¹⁾/sup x⁽ᵏ⁾ = ((k+1)/(k+2))^(k+2) (k+1)/… → 1, ε < 1."""
+    """x' = −x + ε x² from 1: x⁽ᵏ⁾ = e^(−t) (1 − e^(−t))ᵏ ≤ kᵏ/(k + 1)^(k+1), whose ratios tend to 1, ε's radius."""
     form = standard_form(lambda x, w, s, c: [-x[0] + x[0] * x[0]], ["x"], 0)
     t = np.linspace(0.0, 5.0, 20001)
     found = exact_series(form, modes(form.A), NO_INPUT, [1.0], 6)
