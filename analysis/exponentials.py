@@ -20,11 +20,11 @@ from .polynomials import Array
 
 Integers = NDArray[np.int64]
 
-NEAR = 0.1  # a forcing exponent this close to λ, over 1/time scale of λ, is expanded about λ
+NEAR = 0.01, 0.1  # a forcing exponent this close to λ, over 1/time scale of λ, is expanded about λ: steady, secular
 PATIENCE = 1e3  # the time scale of λ is 1/|Re λ|, or this over |λ| where damping is weaker
 EQUAL = 1e-13  # exponents are equal that differ by less than this of the sum of their parts' sizes
 NEGLIGIBLE = 1e-18  # terms of the expansion about λ that are smaller, over its first term, are left out
-BLOCK = 2**19  # values of single terms that are held at a time
+BLOCK = 2**20  # values of single terms that are held at a time
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -103,7 +103,9 @@ def forced_modes(f: Exponentials, start: Complex) -> tuple[Exponentials, list[Re
     exponents, where = distinct(f.multiples[:, 1:])
     forcing = np.zeros((1 + f.multiples[:, 0].max(initial=0), len(exponents), n), complex)
     forcing[f.multiples[:, 0], where] = f.coefficients
-    gap, near = _gaps(exponents, f.rates, n)
+    gap = _gaps(exponents, f.rates, n)
+    secular = forcing[1:].any(axis=(0, 2))
+    near = np.abs(gap) <= np.where(secular, *NEAR[::-1])[:, None] / time_scales(f.rates[:n])
     solution = np.zeros_like(forcing)
     later = np.zeros_like(gap)
     for j in reversed(range(len(forcing))):  # (Σ a_j sʲ exp(δs))' = Σ c_j sʲ exp(δs)
@@ -121,12 +123,11 @@ def forced_modes(f: Exponentials, start: Complex) -> tuple[Exponentials, list[Re
     return particular + _at_eigenvalues(f.rates, start - solution[0].sum(axis=0), resonances), resonances
 
 
-def _gaps(exponents: Integers, rates: Complex, n: int) -> tuple[Complex, NDArray[np.bool_]]:
-    """μ − λ_k (E, n), 0 if that is round-off, and where it is small."""
-    own = rates[:n]
-    gap = (exponents @ rates)[:, None] - own
+def _gaps(exponents: Integers, rates: Complex, n: int) -> Complex:
+    """μ − λ_k (E, n), 0 if that is round-off."""
+    gap = (exponents @ rates)[:, None] - rates[:n]
     gap[np.abs(gap) <= EQUAL * (np.abs(exponents) @ np.abs(rates))[:, None]] = 0.0
-    return gap, np.abs(gap) <= NEAR / time_scales(own)
+    return gap
 
 
 def time_scales(eigenvalues: Complex) -> Array:

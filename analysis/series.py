@@ -65,12 +65,15 @@ class Series:
     def modal(self, t: ArrayLike) -> Complex:
         """ξ⁽ᵏ⁾ (orders, n, len(t)) at the times t [s], none before the first edge, in any order."""
         times = np.asarray(t, dtype=float)
-        values = np.empty((len(self.pieces[0]), len(self.modes.eigenvalues), len(times)), complex)
+        n = len(self.modes.eigenvalues)
+        values = np.empty((len(self.pieces[0]), n, len(times)), complex)
+        upper, lower = np.flatnonzero(self.modes.beta >= 0), np.flatnonzero(self.modes.beta < 0)
         index = np.searchsorted(self.edges, times, side="right") - 1
         for i, (begin, orders) in enumerate(zip(self.edges, self.pieces, strict=True)):
             inside = index == i
             for k, xi in enumerate(orders):
-                values[k, :, inside] = xi(times[inside] - begin).T
+                values[k, upper[:, None], np.flatnonzero(inside)] = xi[upper](times[inside] - begin)
+        values[:, lower] = values[:, lower - n // 2].conj()
         return values
 
     def physical(self, t: ArrayLike) -> Array:

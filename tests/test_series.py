@@ -127,6 +127,13 @@ def test_a_forced_mode_is_its_duhamel_integral(rng: np.random.Generator) -> None
     assert {(r.mode, r.multiples, r.degree) for r in resonances} == {(0, (1, 0, 0), 0), (0, (1, 0, 0), 2)}
 
 
+def test_a_constant_force_on_a_free_mass_is_a_power_of_time() -> None:
+    """ξ' = s² from 1, λ = 0: no time scale at all."""
+    f = Exponentials(np.zeros(1, complex), np.array([[2, 0]]), np.ones((1, 1), complex))
+    xi, _ = forced_modes(f, np.ones(1, complex))
+    np.testing.assert_allclose(xi(np.array([0.0, 3.0]))[0], [1.0, 10.0])
+
+
 @pytest.mark.parametrize("eigenvalue", [-2.0 + 7.0j, -0.01 + 3.0j, 3.0j, 0.2 + 1.0j], ids=str)
 @pytest.mark.parametrize("degree", [0, 2])
 def test_near_resonance_loses_no_more_accuracy_than_is_said(eigenvalue: complex, degree: int) -> None:
