@@ -25,10 +25,11 @@ USEFUL = 0.5  # ratio of successive terms from which on a few of them say nothin
 
 
 def series_findings(run: Run) -> tuple[list[Finding], str]:
-    """A finding for each order of the series under the exported road and forces; if there is none, why."""
+    """A finding for each order of the series under the exported road and forces; if there is none, why.
+
+    For runs that `check` takes: all columns, at least two rows.
+    """
     t = run.trajectory.time[:MOST_ROWS]
-    if len(t) < 2:
-        return [], "it has one row only"
     x = run.trajectory.columns([q.name for q in STATES])[:MOST_ROWS].T
     try:
         terms, ratio = _terms(run, t, x[:, 0])
