@@ -177,8 +177,12 @@ def _judge(run: Run, folder: Path) -> int:
     """Check, write findings.json, print a line for each; 0 if all hold, 1 if not."""
     from .check import check
     from .run_averaging import why_not_averaged
+    from .run_series import series_findings
 
-    findings = check(run)
+    of_series, why_no_series = series_findings(run)
+    findings = [*check(run), *of_series]
+    if why_no_series:
+        print(f"the series in the small parameter is not compared with the run: {why_no_series}", file=sys.stderr)
     if reason := why_not_averaged(run):
         print(f"averaging is not applied: {reason}", file=sys.stderr)
     text = json.dumps([f.as_json() for f in findings], indent=1, ensure_ascii=False) + "\n"

@@ -21,12 +21,15 @@ from fmu_src.vehicle.parameters import Car
 from .polynomials import Array
 from .power_series import cos, sin, variables
 from .signals import Piece, Signal
-from .standard_form import Equations, Function, StandardForm, standard_form
+from .standard_form import Equations, Function, StandardForm, only, standard_form
 
 
-def car_form(car: Car, *, gain: Array | None = None, order: int = 5) -> StandardForm:
-    """The car: states x = (q, q̇) (14), inputs w = (h, ḣ) (8); with a gain (4, 14), under forces u = −gain x."""
-    return standard_form(car_equations(car, gain), [q.name for q in STATES], 8, order=order)
+def car_form(car: Car, *, gain: Array | None = None, forces: bool = False, order: int = 5) -> StandardForm:
+    """The car: states x = (q, q̇) (14), inputs w = (h, ḣ) (8); with a gain (4, 14), under forces u = −gain x.
+
+    forces : whether forces u at the struts are four inputs more, w = (h, ḣ, u) (12); they add to those of a gain.
+    """
+    return standard_form(car_equations(car, gain), [q.name for q in STATES], 12 if forces else 8, order=order)
 
 
 def actuators(car: Car) -> Array:
@@ -41,13 +44,20 @@ def exact_A(car: Car) -> list[list[Fraction]]:
     return [[Fraction(rate.terms.get((j,), 0)) for j in range(14)] for rate in rates]
 
 
+def without_cubic_stiffness(form: StandardForm) -> StandardForm:
+    """The car's form with R̄ and P̄ as §3.2 prints them: cubic only, and no monomials in the coordinates q alone."""
+    return only(form, lambda monomial: len(monomial) == 3 and max(monomial) >= 7)
+
+
 def car_equations(car: Any, gain: Array | None) -> Equations:
     """F(x, w) of a car whose parameters may be any kind of number."""
     rows = [] if gain is None else gain.tolist()
 
     def equations(x: Sequence[Any], w: Sequence[Any], sine: Function, cosine: Function) -> Sequence[Any]:
-        u = [sum((xi * -k for k, xi in zip(row, x, strict=True) if k), 0.0) for row in rows] or [0.0] * 4
-        accelerations, _, _ = equations_of_motion(car, sine, cosine)(x[:7], x[7:], u, w[:4], w[4:])
+        u = list(w[8:]) or [0.0] * 4
+        for i, row in enumerate(rows):
+            u[i] = sum((xi * -k for k, xi in zip(row, x, strict=True) if k), u[i])
+        accelerations, _, _ = equations_of_motion(car, sine, cosine)(x[:7], x[7:], u, w[:4], w[4:8])
         return [*x[7:], *accelerations]
 
     return equations

@@ -10,9 +10,10 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.interpolate import CubicHermiteSpline
 
-from fmu_src.quantities import FORCES, ROAD_BOWS, ROAD_HEIGHTS, ROAD_RATES, STATES, STRUT_TRAVELS
+from fmu_src.quantities import FORCES, ROAD_HEIGHTS, STATES, STRUT_TRAVELS
 from fmu_src.vehicle.parameters import Car
 
+from .recorded_road import recorded_road
 from .trajectory import Array, Trajectory
 
 
@@ -61,12 +62,11 @@ def strut_rates(car: Car, x: Array) -> Array:
 def balance(car: Car, trajectory: Trajectory) -> Balance:
     """Energy balance of a trajectory from its exported columns, to order 4 in its step.
 
-    Within a step the road is the cubic of its height and rate at the start, its bow and its height at the end (the rate
-    at the end, a right-hand limit, would be wrong where the step ends on a corner); wheels and struts are the cubics of
-    their values and rates at both ends; powers are integrated by Gauss's rule. Actuator forces are held.
+    Within a step the road is that of `recorded_road`; wheels and struts are the cubics of their values and rates at
+    both ends; powers are integrated by Gauss's rule. Actuator forces are held.
     """
-    t, step = trajectory.time, np.diff(trajectory.time)
-    x, h, dh, bow, u, travel = (trajectory.columns([q.name for q in table]) for table in _TABLES)
+    t, step, road = trajectory.time, np.diff(trajectory.time), recorded_road(trajectory)
+    x, h, u, travel = (trajectory.columns([q.name for q in table]) for table in _TABLES)
     heights, rates = tyre_heights(car, x)
     c, cp = np.array([car.c1, car.c1, car.c2, car.c2]), np.array([car.cp1, car.cp1, car.cp2, car.cp2])
     b, bp = np.array([car.b1, car.b1, car.b2, car.b2]), np.array([car.bp1, car.bp1, car.bp2, car.bp2])
@@ -75,14 +75,11 @@ def balance(car: Car, trajectory: Trajectory) -> Balance:
 
     nodes, weights = np.polynomial.legendre.leggauss(4)
     road_power, loss = np.zeros(len(step)), np.zeros(len(step))
-    linear, bows = step[:, None] * dh[:-1], 8.0 * bow[1:]
-    quadratic = np.diff(h, axis=0) - linear + bows
     for node, weight in zip(0.5 * (1.0 + nodes), 0.5 * weights, strict=True):
         at = t[:-1] + node * step
-        road = h[:-1] + node * (linear + node * (quadratic - node * bows))
-        road_rate = (linear + node * (2.0 * quadratic - 3.0 * node * bows)) / step[:, None]
+        road_rate = road(at, 1)
         compression_rate = road_rate - wheel(at, 1)
-        N = cp * (road - wheel(at)) + bp * compression_rate
+        N = cp * (road(at) - wheel(at)) + bp * compression_rate
         road_power += weight * np.sum(N * road_rate, axis=1)
         loss += weight * (strut(at, 1) ** 2 @ b + compression_rate**2 @ bp)
     return Balance(
@@ -93,4 +90,4 @@ def balance(car: Car, trajectory: Trajectory) -> Balance:
     )
 
 
-_TABLES = (STATES, ROAD_HEIGHTS, ROAD_RATES, ROAD_BOWS, FORCES, STRUT_TRAVELS)
+_TABLES = (STATES, ROAD_HEIGHTS, FORCES, STRUT_TRAVELS)

@@ -154,6 +154,6 @@ def _transformed(full: NDArray[Any], found: Modes, n: int, degree: int, r: int) 
 def _order(values: Complex) -> list[int]:
     """Indices in the paper's order; real eigenvalues are paired with each other, after the oscillating ones."""
     upper = sorted((i for i, v in enumerate(values) if v.imag > 0), key=lambda i: (values[i].imag, values[i].real))
-    lower = [int(np.argmin(np.abs(values - values[i].conj()))) for i in upper]
+    lower = [i + 1 for i in upper]  # LAPACK puts conjugates behind each other; repeated pairs keep their own vectors
     real = sorted((i for i, v in enumerate(values) if v.imag == 0), key=lambda i: values[i].real)
     return [*upper, *real[: len(real) // 2], *lower, *real[len(real) // 2 :]]

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from .errors import InputError
 from .polynomials import Array, Homogeneous, parts
-from .power_series import PowerSeries, cos, sin, variables
+from .power_series import Monomial, PowerSeries, cos, sin, variables
 
 Function = Callable[[Any], Any]
 Equations = Callable[[Sequence[Any], Sequence[Any], Function, Function], Sequence[Any]]
@@ -61,11 +61,7 @@ def standard_form(
     Raises InputError if F(0, 0) ≠ 0: rest is then no motion.
     """
     n = len(states)
-    y = variables(n + inputs, order)
-    values = equations(y[:n], y[n:], sin, cos)
-    found = parts([value if isinstance(value, PowerSeries) else y[0] * 0 + value for value in values])
-    if 0 in found:
-        raise InputError(f"x' = F(x, w): wanted F(0, 0) = 0, got {found[0].coefficients[:, 0].tolist()}")
+    found = _expanded(equations, n, inputs, order)
     linear = np.zeros((n, n + inputs))
     if 1 in found:
         linear[:, found[1].monomials[:, 0]] = found[1].coefficients
@@ -74,6 +70,45 @@ def standard_form(
     power = powers or {degree: (degree - 1) // 2 if halved else degree - 1 for degree in higher}
     terms: dict[int, tuple[Homogeneous, ...]] = {}
     for degree in higher:
-        part = replace(found[degree], coefficients=found[degree].coefficients.astype(float))
-        terms[power[degree]] = (*terms.get(power[degree], ()), part)
+        terms[power[degree]] = (*terms.get(power[degree], ()), found[degree])
     return StandardForm(names=tuple(states), A=linear[:, :n], B=linear[:, n:], terms=terms, equations=equations)
+
+
+def perturbed(form: StandardForm, perturbation: Equations, *, order: int = 3) -> StandardForm:
+    """x' = F(x, w) + ε G(x, w): all of G's series to a degree ≤ order, its linear part too, becomes a part of ε Φ_1.
+
+    Raises InputError if G(0, 0) ≠ 0.
+    """
+    states, inputs = form.B.shape
+    added = _expanded(perturbation, states, inputs, order)
+
+    def both(x: Sequence[Any], w: Sequence[Any], sine: Function, cosine: Function) -> Sequence[Any]:
+        values = zip(form.equations(x, w, sine, cosine), perturbation(x, w, sine, cosine), strict=True)
+        return [f + g for f, g in values]
+
+    return replace(form, terms={**form.terms, 1: (*form.terms.get(1, ()), *added.values())}, equations=both)
+
+
+def only(form: StandardForm, keep: Callable[[Monomial], bool]) -> StandardForm:
+    """The form with those monomials of Φ that are to be kept; `equations` stay those of the whole system.
+
+    Monomials are sorted indices in y = (x, w): max(monomial) < n keeps the terms without w, so that there is no
+    parametric excitation.
+    """
+    terms: dict[int, tuple[Homogeneous, ...]] = {}
+    for p, found in form.terms.items():
+        for part in found:
+            kept = np.array([keep(tuple(monomial)) for monomial in part.monomials.tolist()], bool)
+            if kept.any():
+                terms[p] = (*terms.get(p, ()), Homogeneous(part.monomials[kept], part.coefficients[:, kept]))
+    return replace(form, terms=terms)
+
+
+def _expanded(equations: Equations, states: int, inputs: int, order: int) -> dict[int, Homogeneous]:
+    """The homogeneous parts of F(x, w) by degree, coefficients as floats. Raises InputError if F(0, 0) ≠ 0."""
+    y = variables(states + inputs, order)
+    values = equations(y[:states], y[states:], sin, cos)
+    found = parts([value if isinstance(value, PowerSeries) else y[0] * 0 + value for value in values])
+    if 0 in found:
+        raise InputError(f"x' = F(x, w): wanted F(0, 0) = 0, got {found[0].coefficients[:, 0].tolist()}")
+    return {degree: replace(part, coefficients=part.coefficients.astype(float)) for degree, part in found.items()}

@@ -46,6 +46,13 @@ def test_an_oscillator_has_the_textbooks_frequency_and_damping() -> None:
     np.testing.assert_allclose(found.damping_ratios, 0.2)
 
 
+def test_two_equal_oscillators_keep_two_modes() -> None:
+    A = np.block([[np.zeros((2, 2)), np.eye(2)], [-np.eye(2), np.zeros((2, 2))]])
+    found = modes(A)
+    np.testing.assert_allclose(found.eigenvalues, [1j, 1j, -1j, -1j], atol=1e-15)
+    np.testing.assert_allclose(found.K @ np.diag(found.eigenvalues) @ found.K_inverse, A, atol=1e-15)
+
+
 def test_a_defective_matrix_is_refused() -> None:
     with pytest.raises(InputError, match="no full set of eigenvectors"):
         modes(np.array([[0.0, 1.0], [-1.0, -2.0]]))

@@ -1,0 +1,78 @@
+"""The series (3.15)–(3.16) against a run: what each order leaves of the exported motion is the next order's term."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fmu_src.quantities import FORCES, STATES
+
+from .car import car_form
+from .check import own_error
+from .discrepancy import scales
+from .errors import InputError
+from .findings import Finding
+from .modes import modes
+from .polynomials import Array
+from .recorded_road import recorded_road
+from .reference import car_of
+from .sampled_series import sampled_series
+from .series import partial_sums, successive_ratios
+from .trajectory import Run
+
+ORDERS = 3  # that are compared with the run; one more term is formed, to know what the last one leaves
+MOST_ROWS = 20_000  # of the run that are compared, from its first
+USEFUL = 0.5  # ratio of successive terms from which on a few of them say nothing about the motion
+
+
+def series_findings(run: Run) -> tuple[list[Finding], str]:
+    """A finding for each order of the series under the exported road and forces; if there is none, why.
+
+    For runs that `check` takes: all columns, at least two rows.
+    """
+    t = run.trajectory.time[:MOST_ROWS]
+    x = run.trajectory.columns([q.name for q in STATES])[:MOST_ROWS].T
+    try:
+        terms, ratio = _terms(run, t, x[:, 0])
+    except InputError as error:  # no modes
+        return [], str(error)
+    if not np.abs(terms[0]).any():
+        return [], "the car stands still"
+    if not ratio < USEFUL:
+        return [], f"the motion is too large: each term is up to {ratio:.2g} times the one before, wanted < {USEFUL:g}"
+    scale = scales(x.T)[:, None]
+    errors = [_sup((x - approximation) / scale) for approximation in partial_sums(terms)[:ORDERS]]
+    sizes = [_sup(term / scale) for term in terms]
+    tails = [sum(sizes[k + 2 :]) + sizes[-1] * ratio / (1.0 - ratio) for k in range(ORDERS)]
+    table = f"errors of order 0, 1, …: {', '.join(f'{e:.2g}' for e in errors)}; factor between the terms {ratio:.2g}"
+    return [
+        Finding(
+            claim=f"the series to order {k} leaves of the run what its next term says: largest difference, over each "
+            "state's maximum",
+            equation="(3.15)–(3.16)",
+            measured=errors[k],
+            expected=sizes[k + 1],
+            tolerance=tails[k] + own_error(run),
+            unit="1",
+            source=f"trajectory.csv, all states, to {t[-1]:g} s; {table}",
+        )
+        for k in range(ORDERS)
+    ], ""
+
+
+@np.errstate(over="ignore", invalid="ignore")  # of motions that are far too large
+def _terms(run: Run, t: Array, x0: Array) -> tuple[Array, float]:
+    """x⁽ᵏ⁾ (ORDERS + 1, 14, len(t)) at the rows' times t from x0, and the largest ratio of successive terms."""
+    form = car_form(car_of(run.parameters), forces=True, order=2 * ORDERS + 1)
+    road, forces = recorded_road(run.trajectory), run.trajectory.columns([q.name for q in FORCES])
+
+    def w(times: Array) -> Array:
+        row = np.searchsorted(t, times, side="right") - 1
+        return np.concatenate([road(times).T, road(times, 1).T, forces[row].T])
+
+    found = sampled_series(form, modes(form.A), w, t, x0, ORDERS)
+    xi = found.modal(t)
+    return (found.modes.K @ xi).real, float(successive_ratios(xi).max()) if xi[0].any() else 0.0
+
+
+def _sup(values: Array) -> float:
+    return float(np.abs(values).max())

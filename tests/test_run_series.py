@@ -1,0 +1,77 @@
+"""The series against runs of the FMUs: truncation orders down to the run's own error, and what `check` says of it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import pytest
+from orders import observed_order
+
+from analysis.cosimulation import simulate
+from analysis.run_series import series_findings
+from analysis.scenario import read_scenario
+from analysis.trajectory import Run
+
+pytestmark = pytest.mark.usefixtures("dist")
+
+
+def simulated(name: str = "bump", *, step: float = 1e-3, **parameters: Any) -> Run:
+    """The first 0.6 s of a built-in scenario with other parameters."""
+    scenario = read_scenario(name)
+    coupling = "jacobi" if parameters.get("road_sampling") == "start" else scenario.coupling
+    changed = {**scenario.parameters, **parameters}
+    return simulate(replace(scenario, step=step, stop_time=0.6, coupling=coupling, parameters=changed))
+
+
+def test_against_runs_the_truncation_error_falls_at_the_same_orders() -> None:
+    """Relative to the motion: A², A⁴, A⁶, at communication steps of which the run's own error is smaller still."""
+    amplitudes = [0.2, 0.15, 0.1]
+    errors = {A: [f.measured for f in series_findings(simulated(A=A, step=5e-4))[0]] for A in amplitudes}
+    for order in range(3):
+
+        def error(A: float, order: int = order) -> float:
+            return errors[A][order]
+
+        slope, bend = observed_order(error, amplitudes)
+        assert slope == pytest.approx(2 * order + 2, abs=0.15)
+        assert bend < 0.02
+
+
+@pytest.mark.parametrize(
+    ("name", "parameters"),
+    [
+        ("bump", {}),
+        ("bump", {"bp1": 150.0, "bp2": 170.0, "tau0": 0.0}),
+        ("bump", {"road_sampling": "start"}),
+        ("fourier-fl", {}),
+        ("sine", {"A": 0.05}),
+        ("bump-lqr", {"A": 0.1, "activation": "at t_on", "t_on": 0.1}),
+    ],
+    ids=["bump", "damped tyres, straight", "road at the start", "fourier", "sine", "controlled"],
+)
+def test_each_order_leaves_what_its_next_term_says(name: str, parameters: dict[str, Any]) -> None:
+    findings, reason = series_findings(simulated(name, **parameters))
+    assert not reason
+    assert all(finding.holds for finding in findings), findings
+    assert findings[0].tolerance < 0.5 * findings[0].expected or parameters.get("road_sampling") == "start"
+
+
+def test_a_motion_of_another_car_is_not_that_of_the_series() -> None:
+    run = simulated(A=0.05)
+    vehicle = {**run.record["parameters"]["vehicle"], "Jx": run.reals("Jx")[0] * 1.001}
+    other = Run(
+        trajectory=run.trajectory,
+        record={**run.record, "parameters": {**run.record["parameters"], "vehicle": vehicle}},
+    )
+    assert not any(finding.holds for finding in series_findings(other)[0])
+
+
+def test_where_nothing_can_be_said_it_says_why() -> None:
+    assert series_findings(simulated(profile="flat"))[1] == "the car stands still"
+    run = simulated()
+    for factor in (100.0, 1e200):
+        trajectory = replace(run.trajectory, values=run.trajectory.values * factor)
+        findings, reason = series_findings(Run(trajectory=trajectory, record=run.record))
+        assert not findings
+        assert reason.startswith("the motion is too large")
