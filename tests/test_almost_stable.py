@@ -111,7 +111,7 @@ def test_the_exact_basin_is_not_left_and_most_of_it_is_proved() -> None:
     with pytest.raises(InputError, match="at least l"):
         claim.delta(0.5 * claim.floor)
     inside = np.linspace(-1.0, 1.0, 21)[None, :] * claim.largest_delta
-    reached = excursions(form, signal, [claim.norm], np.zeros(1), inside, 20.0)[0]
+    reached = excursions(form, signal, [claim.norm], np.zeros(1), inside, 20.0, 0.02)[0]
     assert reached.max() < claim.table[-1, 0]
 
 
@@ -127,7 +127,7 @@ def test_a_forced_oscillator_is_almost_stable_for_ever(equations: Equations) -> 
         for epsilon, delta in claim.table[[0, 8, 16, -1]].tolist():
             off = rng.normal(size=(2, 200))
             off *= delta / claim.norm(off)
-            assert excursions(form, signal, [claim.norm], np.zeros(2), off, 25.0).max() < epsilon
+            assert excursions(form, signal, [claim.norm], np.zeros(2), off, 25.0, 0.02).max() < epsilon
             assert claim.delta(epsilon) == delta
 
 

@@ -33,7 +33,7 @@ def motions(
     x, ones = x0, np.ones(x0.shape[1])
     yield edges[0], x
     for piece, begin, end in zip(signal.pieces, edges, edges[1:], strict=False):
-        times = np.linspace(begin, end, int(np.ceil((end - begin) / STEP)) + 1)
+        times = np.linspace(begin, end, int(np.ceil((end - begin) / step)) + 1)
         for t, later in zip(times[:-1].tolist(), times[1:].tolist(), strict=True):
             h = later - t
             w0, w1, w2 = (piece(s)[:, None] * ones for s in (t, t + 0.5 * h, later))
@@ -45,10 +45,12 @@ def motions(
             yield later, x
 
 
-def excursions(form: StandardForm, signal: Signal, norms: Sequence[Norm], x0: Array, off: Array, stop: float) -> Array:
+def excursions(
+    form: StandardForm, signal: Signal, norms: Sequence[Norm], x0: Array, off: Array, stop: float, step: float = STEP
+) -> Array:
     """sup N(x − x_lin) (norms, K) up to `stop` of the motions from x0 + off (n, K), x_lin from x0 (n,)."""
     found = np.zeros((len(norms), off.shape[1]))
-    rows = list(motions(form, signal, x0[:, None] + off, stop))
+    rows = list(motions(form, signal, x0[:, None] + off, stop, step))
     x_lin = linear_response(form.A, form.B, x0, signal, np.array([t for t, _ in rows]))
     for (_, x), lin in zip(rows, x_lin.T, strict=True):
         found = np.maximum(found, [norm(x - lin[:, None]) for norm in norms])

@@ -96,7 +96,10 @@ def proved_metric(system: ExactSystem, S: Array) -> Metric:
     """
     zero = [arb(0)]
     A = jacobian(system, zero * system.n, zero * system.m)
-    inverse = matrix(S).inv()
+    try:
+        inverse = matrix(S).inv()
+    except ZeroDivisionError as error:
+        raise NotProvedError("the metric is singular") from error
     turned = matrix(S) * A * inverse
     symmetric = (turned + turned.transpose()) / 2
     alpha = np.inf

@@ -8,12 +8,12 @@ from typing import Any
 import numpy as np
 from flint import arb, arb_mat, arb_series, fmpq
 
-from .balls import ExactSystem, coefficients, column, cosine, jacobian, precision, sine
+from .balls import ExactSystem, NotProvedError, coefficients, column, cosine, jacobian, precision, sine
 from .tube import Piece
 
 DEGREE = 22
 LAST_TERM = 1e-14  # of a polynomial, over the size of the motion: it sets the length of a piece
-LONGEST = 0.25  # s
+LONGEST, SHORTEST = 0.25, 1e-5  # s
 
 
 def find_pieces(system: ExactSystem, x0: Sequence[float], stop: fmpq, *, linear_only: bool = False) -> list[Piece]:
@@ -33,8 +33,11 @@ def find_pieces(system: ExactSystem, x0: Sequence[float], stop: fmpq, *, linear_
         linear = _linear_taylor(A, B, x_lin, w)
         full = linear if linear_only else _taylor(system, w, x)
         size = max(size, *(abs(float(c[0])) for c in full))
+        h = _length(full, size)
+        if not h > SHORTEST:
+            raise NotProvedError(f"the motion runs away near t = {float(t):g} s: its Taylor series lasts {h:.1g} s")
         left = min([c for c in corners if c > t] + [stop]) - t
-        pieces.append(_scaled(linear, full, t, t + _fitting(_length(full, size), left)))
+        pieces.append(_scaled(linear, full, t, t + _fitting(h, left)))
         ends = pieces[-1].linear.sum(axis=1), pieces[-1].error.sum(axis=1)
         x_lin = column([arb(v) for v in ends[0].tolist()])
         x = [arb(a) + arb(b) for a, b in zip(*(end.tolist() for end in ends), strict=True)]
