@@ -22,8 +22,8 @@ from .exact_car import energy_norm, exact_system, norms
 from .polynomials import Array
 from .reference import Parameters, car_of, road_parameters
 
-SETTLED_REST = 7.0  # the pieces last this many times 1/α beyond the last corner if the road then is flat,
-SETTLED_PERIODIC = 14.0  # and this many if it goes on: what is left of the start, exp(−14), is what e may be off by
+AFTER_REST = (7.0, 14.0)  # the pieces last so many times 1/α beyond the last corner if the road then is flat,
+AFTER_PERIODIC = (13.0, 18.0, 23.0)  # and so many if it goes on: what is left of the start is as small as exp(−13) …
 
 
 def model_of(parameters: Mapping[str, Any], gain: Array | None = None) -> dict[str, Any]:
@@ -55,20 +55,20 @@ def certify_car(parameters: Mapping[str, Any], gain: Array | None = None) -> tup
 
     Raises NotProvedError, with the reason, if there is none; InputError for parameters that cannot be.
     """
-    model, car, S, end = _prepared(parameters, gain)
-    return certify(model, build, S, lambda x_lin: norms(car, x_lin), end, np.zeros(14))
+    model, car, S, ends = _prepared(parameters, gain)
+    return certify(model, build, S, lambda x_lin: norms(car, x_lin), ends, np.zeros(14))
 
 
 def prove_reference(parameters: Mapping[str, Any], gain: Array | None = None) -> Proof:
     """The proof behind a certificate, without its table of δ(ε)."""
-    model, _, S, end = _prepared(parameters, gain)
+    model, _, S, ends = _prepared(parameters, gain)
     with precision(2):
         system = build(model)
-        return prove(system, proved_metric(system, S), find_pieces(system, [0.0] * 14, end), [0.0] * 14)
+        return prove(system, proved_metric(system, S), find_pieces(system, [0.0] * 14, ends[0]), [0.0] * 14)
 
 
-def _prepared(parameters: Mapping[str, Any], gain: Array | None) -> tuple[dict[str, Any], Car, Array, fmpq]:
-    """Model, car, metric, and the time at which the pieces may end."""
+def _prepared(parameters: Mapping[str, Any], gain: Array | None) -> tuple[dict[str, Any], Car, Array, list[fmpq]]:
+    """Model, car, metric, and the times at which the pieces may end."""
     model = model_of(parameters, gain)
     try:
         with precision(2):
@@ -77,7 +77,7 @@ def _prepared(parameters: Mapping[str, Any], gain: Array | None) -> tuple[dict[s
         raise InputError(f"the parameters of car and road: {error}") from error
     car = car_of(dict(parameters))
     A = car_form(car, gain=gain, order=1).A
-    return model, car, metric_of(car, gain), stop(system, A)
+    return model, car, metric_of(car, gain), stops(system, A)
 
 
 def metric_of(car: Car, gain: Array | None = None) -> Array:
@@ -85,12 +85,12 @@ def metric_of(car: Car, gain: Array | None = None) -> Array:
     return modal_metric(car_form(car, gain=gain, order=1).A, energy_norm(car).T)
 
 
-def stop(system: ExactSystem, A: Array) -> fmpq:
+def stops(system: ExactSystem, A: Array) -> list[fmpq]:
     """When the pieces may end: what is left of the start is small, and a whole number of periods is over."""
     alpha = -float(np.linalg.eigvals(A).real.max())
     if not alpha > 0.0:
         raise NotProvedError(f"the linear car does not settle: growth rate {-alpha:.3g} 1/s; wanted < 0")
-    corner = system.pieces[-1][0]
-    if system.period == 0:
-        return corner + fmpq(int(SETTLED_REST / alpha * 1000) + 1, 1000)
-    return corner + system.period * int(SETTLED_PERIODIC / alpha / float(system.period) + 1)
+    corner, period = system.pieces[-1][0], system.period
+    if period == 0:
+        return [corner + fmpq(int(times / alpha * 1000) + 1, 1000) for times in AFTER_REST]
+    return [corner + period * int(times / alpha / float(period) + 1) for times in AFTER_PERIODIC]

@@ -19,7 +19,7 @@ from .bertolino_baksa.norms import proved_metric
 from .bertolino_baksa.proof import Proof
 from .bertolino_baksa.quick import quick_floors
 from .car import car_form, road_signal
-from .car_certificates import build, certify_car, metric_of, model_of, prove_reference, stop
+from .car_certificates import build, certify_car, metric_of, model_of, prove_reference, stops
 from .exact_car import exact_car, norms
 from .files import write_whole
 from .linear_response import linear_response
@@ -69,7 +69,7 @@ def quick_answer(parameters: Parameters) -> int:
     try:
         with precision(2):
             system = build(model_of(parameters))
-            end = stop(system, form.A)
+            end = stops(system, form.A)[0]
             x_lin = linear_response(form.A, form.B, np.zeros(14), signal, np.linspace(0.0, float(end), 2000))
             named = norms(car, x_lin)
             floors = quick_floors(system, proved_metric(system, metric_of(car)), named, [0.0] * 14, end)
@@ -93,8 +93,8 @@ def statement(certificate: Certificate, proof: Proof) -> list[str]:
     for claim, floor in zip(certificate.claims, true.tolist(), strict=True):
         epsilon, delta = claim.table[-1].tolist()
         lines.append(
-            f"  {claim.norm.name} norm: l = {claim.floor:.6g} (a reference motion reaches {floor:.6g}: "
-            f"ratio {claim.floor / floor:.4f}); delta up to {delta:.4g}, at eps = {epsilon:.4g}"
+            f"  {claim.norm.name} norm: l = {claim.floor:.6g} (a reference motion reaches {floor:.6g}"
+            f"{f': ratio {claim.floor / floor:.4f}' if floor > 0.0 else ''}); delta up to {delta:.4g}, at eps = {epsilon:.4g}"
         )
     ends = "x -> 0 after the road's end" if proof.repetition is None else "every period's tube returns into itself"
     return [*lines, f"  {ends}", *_tubes(proof), *_tyres(parameters, proof)]

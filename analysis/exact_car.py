@@ -19,6 +19,7 @@ from .bertolino_baksa.norms import Norm, euclid, weighted_sup
 from .car import car_equations
 from .polynomials import Array
 
+LEAST = 1e-3
 NEVER = fmpq(1000000)  # s; where a wheel meets no road
 
 
@@ -82,7 +83,11 @@ def energy_norm(car: Car) -> Norm:
 
 
 def norms(car: Car, x_lin: Array) -> tuple[Norm, ...]:
-    """The norms of a statement: energy [√J]; each state over its largest value in x_lin (14, …) [1]; Euclid [SI]."""
-    largest = np.abs(x_lin).max(axis=1)
-    weights = np.maximum(largest, 1e-6 * largest.max() + 1e-12)
-    return energy_norm(car), weighted_sup(weights), euclid(14)
+    """The norms of a statement: energy [√J]; each state over its largest value in x_lin (14, …) [1]; Euclid [SI].
+
+    States that (nearly) rest in x_lin are taken over LEAST of what its energy could make of them.
+    """
+    energy = energy_norm(car)
+    could = np.linalg.norm(np.linalg.inv(energy.T), axis=1) * max(energy(x_lin).max(), 1e-9)
+    weights = np.maximum(np.abs(x_lin).max(axis=1), LEAST * could)
+    return energy, weighted_sup(weights), euclid(14)

@@ -61,7 +61,7 @@ def certified(
     made = build(equations, states, swinging if forced else quiet, PERIOD if forced else fmpq(0))
     S, start = modal_metric(form.A, np.eye(states)), np.array(x0 or [0.0] * states)
     norms = (euclid(states), weighted_sup(np.ones(states)))
-    certificate, proof = certify({}, made, S, lambda x_lin: norms, fmpq(30), start)
+    certificate, proof = certify({}, made, S, lambda x_lin: norms, [fmpq(30)], start)
     signal = harmonic([0.3], OMEGA) if forced else constant([0.0])
     return certificate, proof, form, signal
 
@@ -156,7 +156,7 @@ def test_a_claimed_period_that_is_none_is_refused() -> None:
     form = standard_form(duffing, ["x", "v"], 1)
     wrong = build(duffing, 2, swinging, fmpq(1))
     with pytest.raises(NotProvedError):
-        certify({}, wrong, modal_metric(form.A, np.eye(2)), lambda x: (euclid(2),), fmpq(30), np.zeros(2))
+        certify({}, wrong, modal_metric(form.A, np.eye(2)), lambda x: (euclid(2),), [fmpq(30)], np.zeros(2))
 
 
 # ---------------------------------------------------------------------------------------------------- certificates

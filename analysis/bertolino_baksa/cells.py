@@ -11,15 +11,15 @@ from dataclasses import dataclass
 
 import numpy as np
 from flint import arb
-from numpy.typing import NDArray
 from scipy.linalg import expm
 
 from .balls import Array, ExactSystem, above, matrix, rounded, two_norm
 from .norms import Metric, Norm
 from .tube import Outputs, Piece, Tube, enclosed_series
 
-CELLS = 8  # per piece, for e^(At) and the growth of perturbations
-FINER = 12  # times as many, for the norm of e
+CELLS, LATE_CELLS = 8, 2  # per piece, for e^(At) and the growth of perturbations: at first, and from
+LATE = 2.0  # times the slowest time constant on, when what oscillates fast has died out
+FINE = 96  # per piece, for the norm of e
 EPS = 1e-13  # relative: covers the roundings of a polynomial's or a product's value, over the sum of its terms' sizes
 
 
@@ -27,7 +27,6 @@ EPS = 1e-13  # relative: covers the roundings of a polynomial's or a product's v
 class Decay:
     """e^(At) over the cells: width [s] (N,), ends (N + 1, n, n), and `curve` (N, n, n) ≥ sup |A² e^(At)| Δ²/8."""
 
-    piece: NDArray[np.intp]  # (N,) index of the piece that the cell lies in
     width: Array
     ends: Array
     curve: Array
@@ -65,54 +64,67 @@ class Decay:
 
 
 def decay(metric: Metric, pieces: tuple[Piece, ...]) -> Decay:
-    """e^(At) over CELLS equal cells of each piece, from the first piece's begin."""
+    """e^(At) over the cells of the pieces, from the first piece's begin."""
     A, start = metric.A, pieces[0].begin
     ends, off = [np.eye(A.nrows())], 0.0
     A_size = np.abs(rounded(A)[0])
-    widths = [above(arb(p.duration) / CELLS) for p in pieces]
-    for p in pieces:
-        now, over = (A * arb(p.begin - start)).exp(), (A * (arb(p.duration) / CELLS)).exp()
-        for _ in range(CELLS):
+    cells = counts(pieces, metric)
+    for p, count in zip(pieces, cells, strict=True):
+        now, over = (A * arb(p.begin - start)).exp(), (A * (arb(p.duration) / count)).exp()
+        for _ in range(count):
             now = now * over
             centre, rest = rounded(now)
             ends.append(centre)
             off = max(off, rest)
-    values, width = np.array(ends), np.repeat(widths, CELLS)
-    spread = np.repeat([expm(A_size * w * (1 + EPS)) for w in widths], CELLS, axis=0)  # ≥ |e^(As)|, 0 ≤ s ≤ Δ
+    values, width = np.array(ends), widths(pieces, metric)
+    distinct, where = np.unique(width, return_inverse=True)
+    spread = np.array([expm(A_size * w * (1 + EPS)) for w in distinct])[where]  # ≥ |e^(As)|, 0 ≤ s ≤ Δ
     second = np.abs((rounded(A)[0] @ rounded(A)[0]) @ values[:-1])
     second += 1e-9 * second.max()  # its rounding, with much to spare
     curve = (second @ spread) * (width**2 / 8)[:, None, None] * (1 + 1e-9)
-    return Decay(np.repeat(np.arange(len(pieces)), CELLS), width, values, curve, off)
+    return Decay(width, values, curve, off)
+
+
+def counts(pieces: Sequence[Piece], metric: Metric) -> list[int]:
+    """Number of equal cells of each piece."""
+    return [CELLS if float(p.begin) * metric.alpha < LATE else LATE_CELLS for p in pieces]
+
+
+def widths(pieces: Sequence[Piece], metric: Metric) -> Array:
+    """Widths (N,) of the cells [s]."""
+    cells = zip(pieces, counts(pieces, metric), strict=True)
+    return np.concatenate([np.full(count, above(arb(p.duration) / count)) for p, count in cells])
 
 
 def ranges(pieces: Sequence[Piece], off: Array, metric: Metric) -> Array:
     """X (N, n) ≥ sup |x_j| over each of the cells of `decay`, for motions within `off` (pieces,) of the pieces' x."""
     found = []
-    for piece, V in zip(pieces, off, strict=True):
-        values, bend = _sampled(piece.linear + piece.error, CELLS)
+    for piece, count, V in zip(pieces, counts(pieces, metric), off, strict=True):
+        values, bend = _sampled(piece.linear + piece.error, count)
         found.append(np.maximum(np.abs(values[:, :-1]), np.abs(values[:, 1:])).T + bend + V * metric.reach)
     return np.concatenate(found) * (1 + EPS)
 
 
-def inputs(system: ExactSystem, pieces: tuple[Piece, ...]) -> Array:
+def inputs(system: ExactSystem, metric: Metric, pieces: Sequence[Piece]) -> Array:
     """W (N, m) ≥ sup |w| over each of the cells of `decay`."""
     found = []
-    for p in pieces:
-        steps = [arb(p.begin) + arb(p.duration) * (arb(k) + arb(0.5, 0.5)) / CELLS for k in range(CELLS)]
+    for p, count in zip(pieces, counts(pieces, metric), strict=True):
+        steps = [arb(p.begin) + arb(p.duration) * (arb(k) + arb(0.5, 0.5)) / count for k in range(count)]
         found += [[above(w) for w in system.inputs_at(p.begin)(t)] for t in steps]
     return np.array(found)
 
 
 def errors(tube: Tube, metric: Metric, norm: Norm) -> Array:
-    """sup N(e) over each of the cells of `decay`, from FINER cells in it."""
+    """sup N(e) over each of the cells of `decay`, from finer ones in it."""
     found, c = [], metric.of(norm)
-    for piece, V in zip(tube.pieces, tube.error, strict=True):
+    for piece, count, V in zip(tube.pieces, counts(tube.pieces, metric), tube.error, strict=True):
         sizes = np.abs(norm.T) @ np.abs(piece.error)
-        values, bend = _sampled(norm.T @ piece.error, CELLS * FINER, sizes)
+        values, bend = _sampled(norm.T @ piece.error, FINE, sizes)
         sizes = np.abs(values).max(axis=0) if norm.largest else np.sqrt((values**2).sum(axis=0))
         curved = bend.max() if norm.largest else np.sqrt((bend**2).sum())
-        found.append(np.maximum(sizes[:-1], sizes[1:]) + curved + c * V)
-    return np.concatenate(found).reshape(-1, FINER).max(axis=1) * (1 + EPS)
+        fine = np.maximum(sizes[:-1], sizes[1:]) + curved + c * V
+        found.append(fine.reshape(count, -1).max(axis=1))
+    return np.concatenate(found) * (1 + EPS)
 
 
 def _sampled(coefficients: Array, cells: int, sizes: Array | None = None) -> tuple[Array, Array]:
@@ -131,7 +143,7 @@ def errors_of_states(tube: Tube, metric: Metric) -> Array:
     """sup |e_j| (n,) over all pieces."""
     found = []
     for piece, V in zip(tube.pieces, tube.error, strict=True):
-        values, bend = _sampled(piece.error, CELLS * FINER)
+        values, bend = _sampled(piece.error, FINE)
         found.append(np.abs(values).max(axis=1) + bend + V * metric.reach)
     return np.max(found, axis=0) * (1 + EPS)
 
@@ -141,7 +153,7 @@ def outputs(system: ExactSystem, tube: Tube, metric: Metric, functions: Outputs)
     low, high = [], []
     for piece, V in zip(tube.pieces, tube.full, strict=True):
         centres, rest = enclosed_series(system, piece, functions, metric.reach * V)
-        values, bend = _sampled(centres, CELLS * FINER)
+        values, bend = _sampled(centres, FINE)
         low.append((values - bend[:, None]).min(axis=1) - rest)
         high.append((values + bend[:, None]).max(axis=1) + rest)
     return np.min(low, axis=0), np.max(high, axis=0)

@@ -9,7 +9,7 @@ from __future__ import annotations
 import hashlib
 import json
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -76,17 +76,27 @@ class Certificate:
 
 
 def certify(
-    model: dict[str, Any], build: Build, S: Array, norms: Callable[[Array], tuple[Norm, ...]], stop: fmpq, x0: Array
+    model: dict[str, Any],
+    build: Build,
+    S: Array,
+    norms: Callable[[Array], tuple[Norm, ...]],
+    stops: Sequence[fmpq],
+    x0: Array,
 ) -> tuple[Certificate, Proof]:
-    """Find pieces to `stop` [s] and the largest table of δ(ε) in each norm; norms are made from x_lin's values (n, …).
+    """Find pieces and the largest table of δ(ε) in each norm; norms are made from x_lin's values (n, …).
+
+    stops : ends of the pieces [s], in rising order: the first from which on the tail has no part in the floors is taken.
 
     Raises NotProvedError, with what failed, if there is no certificate.
     """
     with precision(2):
         system = build(model)
-        pieces = tuple(find_pieces(system, x0.tolist(), stop))
-        proof = prove(system, proved_metric(system, S), pieces, x0.tolist())
-        x_lin = np.concatenate([values(p.linear) for p in pieces], axis=1)
+        for stop in stops:
+            pieces = tuple(find_pieces(system, x0.tolist(), stop))
+            proof = prove(system, proved_metric(system, S), pieces, x0.tolist())
+            x_lin = np.concatenate([values(p.linear) for p in pieces], axis=1)
+            if all(proof.settled(norm) for norm in norms(x_lin)):
+                break
         claims = tuple(_claim(proof, norm, float(norm(x_lin).max())) for norm in norms(x_lin))
     return Certificate(model, x0, S, pieces, claims), proof
 

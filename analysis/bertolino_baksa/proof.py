@@ -19,6 +19,7 @@ from .majorant import Majorant, majorant
 from .norms import Metric, Norm
 from .tube import Piece, Tube, both, jumps, prove_tube
 
+SETTLED = 1e-3
 ROOM = 1.5  # of the box on which the equations are bounded, over the largest motion
 ROOM_INPUT = 10.0  # the same for inputs, so that a quiet motion under a large input is not taken for a large one
 
@@ -55,6 +56,11 @@ class Proof:
         on_pieces = errors(self.tube, self.metric, norm)[:, None] + kappa[:, None] * delta + c * top
         later = self._later(norm, bound, self.decay.at_end(self.metric, norm) * delta + end)
         return np.maximum(on_pieces.max(axis=0), later) * (1.0 + 1e-9)
+
+    def settled(self, norm: Norm) -> bool:
+        """Whether longer pieces would lower the floor by less than SETTLED of it: the tail has no part in it."""
+        floor = float(self.epsilon(norm, np.zeros(1))[0])
+        return floor <= (1.0 + SETTLED) * float(errors(self.tube, self.metric, norm).max())
 
     def majorant(self, spread: Array) -> Majorant:
         """R̄ on a box with room for motions that are off the reference by `spread` (n,)."""
@@ -99,7 +105,7 @@ def prove(system: ExactSystem, metric: Metric, pieces: Sequence[Piece], x0: Sequ
     if pieces[-1].end < system.pieces[-1][0]:
         raise NotProvedError("the pieces end before the road's last corner")
     tube = prove_tube(system, metric, pieces, (np.array(x0, dtype=float), np.zeros(system.n)))
-    X = np.hstack([ranges(tube.pieces, tube.full, metric), inputs(system, tube.pieces)])
+    X = np.hstack([ranges(tube.pieces, tube.full, metric), inputs(system, metric, tube.pieces)])
     again = _repetition(system, metric, tube) if system.period != 0 else None
     proof = Proof(system, metric, tube, decay(metric, tube.pieces), X, again)
     if again is None and not rest_growth(system, metric, proof.ends[0]) < metric.alpha:
@@ -122,7 +128,7 @@ def _repetition(system: ExactSystem, metric: Metric, tube: Tube) -> Repetition:
     returned = [max(v, t) + j for v, t, j in zip(window.at_end, tube.at_end, jump, strict=True)]
     if not all(v * (1.0 + 1e-15) <= o for v, o in zip(returned, off, strict=True)):
         raise NotProvedError("the tube of one period does not come back into itself")
-    return Repetition(window, np.hstack([ranges(window.pieces, window.full, metric), inputs(system, pieces)]))
+    return Repetition(window, np.hstack([ranges(window.pieces, window.full, metric), inputs(system, metric, pieces)]))
 
 
 def _window(system: ExactSystem, pieces: Sequence[Piece]) -> int:

@@ -10,8 +10,8 @@ from collections.abc import Sequence
 import numpy as np
 from flint import arb, fmpq
 
-from .balls import ExactSystem, NotProvedError, above, column
-from .cells import CELLS, inputs, ranges
+from .balls import ExactSystem, NotProvedError, column
+from .cells import inputs, ranges, widths
 from .growth import perturbed
 from .majorant import majorant
 from .norms import Metric, Norm
@@ -30,10 +30,10 @@ def quick_floors(
         raise NotProvedError("the quick comparison needs a road that ends flat")
     pieces = tuple(find_pieces(system, x0, stop, linear_only=True))
     off = prove_linear(system, metric, pieces)
-    spread = np.hstack([ranges(pieces, off, metric), inputs(system, pieces)])
+    spread = np.hstack([ranges(pieces, off, metric), inputs(system, metric, pieces)])
     bound = majorant(system, ROOM * spread.max(axis=0) + 1e-9)
-    widths = np.repeat([above(arb(p.duration) / CELLS) for p in pieces], CELLS)
-    top, end = perturbed(metric, bound, widths, np.zeros_like(spread), spread[:, :, None], np.zeros(1))
+    start = np.zeros_like(spread)
+    top, end = perturbed(metric, bound, widths(pieces, metric), start, spread[:, :, None], np.zeros(1))
     last = metric.length(column([arb(v) for v in pieces[-1].linear.sum(axis=1).tolist()])) * (1 + 1e-12) + off[-1]
     size = last + float(end[0])
     L = rest_growth(system, metric, size)
