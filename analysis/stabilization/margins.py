@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import control
 import numpy as np
@@ -15,6 +16,7 @@ from ..polynomials import Array
 
 DECADES = (-2.0, 5.0)  # of the frequencies looked at [rad/s]
 PER_DECADE = 400
+MOST_GAIN = 1e6  # what the polynomials of a loop give beyond it is round-off: taken for none
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,11 +63,11 @@ def margins(A: Array, B: Array, K: Array) -> Margins:
 
 
 def loop_margins(A: Array, B: Array, K: Array, i: int) -> LoopMargins:
-    """Of the i-th actuator alone, by python-control; what it finds beyond the frequencies looked at is round-off."""
+    """Of the i-th actuator alone, by python-control."""
     others = np.arange(len(K)) != i
     loop = control.ss(A + B[:, others] @ K[others], B[:, [i]], -K[[i]], 0.0)
-    gains, phases, _, at, *_ = control.stability_margins(loop, returnall=True)
-    gains = gains[at < _frequencies()[-1]]
+    gains, phases, *_ = control.stability_margins(loop, returnall=True)
+    gains = gains[gains < MOST_GAIN]
     return LoopMargins(
         down=float(max(gains[gains < 1.0], default=0.0)),
         up=float(min(gains[gains > 1.0], default=np.inf)),
@@ -99,7 +101,7 @@ def _frequencies() -> Array:
     return np.logspace(first, last, 1 + int((last - first) * PER_DECADE))
 
 
-def _least(measure: Callable[[float], float]) -> float:
+def _least(measure: Callable[[float], Any]) -> float:
     """Least value over all frequencies, refined between those of the grid."""
     omega = _frequencies()
     values = [measure(w) for w in omega]

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 from scipy.integrate import simpson, solve_ivp
-from scipy.interpolate import make_interp_spline
+from scipy.interpolate import BSpline, make_interp_spline
+from scipy.linalg import expm
 
 from fmu_src.controller.riccati import finite_horizon, infinite_horizon
 
@@ -67,7 +67,8 @@ class Regulator:
 
     def running_cost(self, x: Array, u: Array) -> Array:
         """½ (xᵀQx + uᵀRu) (k,) of states (n, k) and controls (m, k)."""
-        return 0.5 * (np.einsum("ik,ij,jk->k", x, self.Q, x) + np.einsum("ik,ij,jk->k", u, self.R, u))
+        cost: Array = 0.5 * (np.einsum("ik,ij,jk->k", x, self.Q, x) + np.einsum("ik,ij,jk->k", u, self.R, u))
+        return cost
 
 
 def _least_eigenvalue(name: str, weight: Array) -> tuple[float, float]:
@@ -95,7 +96,9 @@ def instants(begin: float, end: float, step: float) -> Array:
     """
     span = end - begin
     if not span > 0.0:
-        raise InputError(f"T = {end:g} s: wanted an end of control after its start at {begin:g} s, got {span:g} s of it")
+        raise InputError(
+            f"T = {end:g} s: wanted an end of control after its start at {begin:g} s, got {span:g} s of it"
+        )
     if not step > 0.0:
         raise InputError(f"step = {step:g} s: wanted > 0")
     if span < step:
@@ -103,13 +106,12 @@ def instants(begin: float, end: float, step: float) -> Array:
     return np.linspace(begin, end, 1 + int(np.ceil(span / step - 1e-9)))
 
 
-def riccati_solution(regulator: Regulator, span: float) -> Callable[[Array], Array]:
+def riccati_solution(regulator: Regulator, span: float) -> BSpline:
     """L (…, n, n) of (4.7) with L(T) = 0, as a function of the times to go (…) in [0, span] [s]."""
     fastest = float(np.abs(np.linalg.eigvals(regulator.hamiltonian)).max())
     to_go = np.linspace(0.0, span, 2 * DEGREE + int(span * fastest / RESOLUTION))
     L = finite_horizon(regulator.A, regulator.B, regulator.Q, regulator.R, to_go)
-    spline: Callable[[Array], Array] = make_interp_spline(to_go, L, k=DEGREE)
-    return spline
+    return make_interp_spline(to_go, L, k=DEGREE)
 
 
 def stationary(regulator: Regulator) -> tuple[Array, Array]:
@@ -124,7 +126,7 @@ def stationary(regulator: Regulator) -> tuple[Array, Array]:
 
 
 def by_riccati(regulator: Regulator, x0: Array, t: Array) -> Arc:
-    """The optimal arc from x0 (n,) at t[0] to t[-1] as §4 has it: L backward by (4.7), then x' = (A − S L) x forward."""
+    """The optimal arc from x0 (n,) at t[0] as §4 has it: L backward from t[-1] by (4.7), then x' = (A − S L) x forward."""
     L, S = riccati_solution(regulator, t[-1] - t[0]), regulator.S
     solution = solve_ivp(
         lambda s, x: (regulator.A - S @ L(t[-1] - s)) @ x,
@@ -145,3 +147,17 @@ def by_riccati(regulator: Regulator, x0: Array, t: Array) -> Arc:
 def quadrature(regulator: Regulator, t: Array, x: Array, u: Array) -> float:
     """J = ∫ ½ (xᵀQx + uᵀRu) dt along a sampled motion, by Simpson's rule."""
     return float(simpson(regulator.running_cost(x, u), x=t))
+
+
+def energy_to_rest(A: Array, B: Array, x0: Array, span: float) -> float:
+    """Least ∫ uᵀu dt that brings x' = A x + B u from x0 to rest in the time `span` [s]: what control must spend.
+
+    (e^{AT} x0)ᵀ W⁻¹ (e^{AT} x0) with the controllability Gramian W; infinite where W is singular.
+    """
+    n = len(A)
+    flow = expm(np.block([[-A, B @ B.T], [np.zeros((n, n)), A.T]]) * span)
+    gramian, end = flow[n:, n:].T @ flow[:n, n:], flow[n:, n:].T @ x0  # C. F. Van Loan, IEEE TAC 23 (1978) 395
+    try:
+        return float(end @ np.linalg.solve(gramian, end))
+    except np.linalg.LinAlgError:
+        return float("inf")
