@@ -23,8 +23,8 @@ class Certified:
     """What became of the box, by shares of its volume, and in how many sub-boxes.
 
     proved   : A + B K is stable, also if the parameters move about within a sub-box while the system runs.
-    unstable : of sub-boxes whose middle has an eigenvalue with a real part ≥ 0, found in doubles; `witness` is one.
-    The rest is open: the budget ended.
+    unstable : it is not at the middle and at all corners, in doubles.
+    The rest is open: the budget ended.  witness: the first middle at which it is not stable.
     """
 
     proved: float
@@ -50,10 +50,13 @@ def certify(plant: Plant, K: Array, box: Box, budget: int = 300) -> Certified:
         boxes += 1
         middle = {name: float(low + high) / 2.0 for name, (low, high) in here.items()}
         values, V = np.linalg.eig(closed_loop(plant, K, middle))
-        if values.real.max() >= 0.0:
-            share["unstable"], witness = share["unstable"] + volume, witness or middle
-        elif _proved(plant, K, here, V):
+        stable = values.real.max() < 0.0
+        if not stable:
+            witness = witness or middle
+        if stable and _proved(plant, K, here, V):
             share["proved"] += volume
+        elif not stable and all(growth(plant, K, _doubles(corner)) >= 0.0 for corner in _corners(here)):
+            share["unstable"] += volume
         else:
             waiting.extend((half, 0.5 * volume) for half in _halves(plant, K, here, V))
     return Certified(share["proved"], share["unstable"], boxes, witness)
@@ -72,12 +75,17 @@ def closed_loop(plant: Plant, K: Array, values: Mapping[str, float]) -> Array:
     return closed
 
 
+def growth(plant: Plant, K: Array, values: Mapping[str, float]) -> float:
+    """Largest real part of the eigenvalues of A + B K [1/s] at these parameters, in doubles."""
+    return float(np.linalg.eigvals(closed_loop(plant, K, values)).real.max())
+
+
 def _proved(plant: Plant, K: Array, box: Box, V: Any) -> bool:
     inverse = np.linalg.inv(V / np.linalg.norm(V, axis=0))
     P = (inverse.conj().T @ inverse).real
     P = 0.5 * (P + P.T) / np.abs(P).max()
     for corner in _corners(box):  # in doubles first: that sorts out the most
-        PA = P @ closed_loop(plant, K, {name: float(value) for name, value in corner.items()})
+        PA = P @ closed_loop(plant, K, _doubles(corner))
         if np.linalg.eigvalsh(PA + PA.T)[-1] >= 0.0:
             return False
     with precision(1):
@@ -112,6 +120,10 @@ def _is_positive(matrix: Any) -> bool:
     return True
 
 
+def _doubles(values: Mapping[str, fmpq]) -> dict[str, float]:
+    return {name: float(value) for name, value in values.items()}
+
+
 def _corners(box: Box) -> list[dict[str, fmpq]]:
     return [dict(zip(box, values, strict=True)) for values in product(*box.values())]
 
@@ -123,7 +135,7 @@ def _halves(plant: Plant, K: Array, box: Box, V: Any) -> list[Box]:
 
     def effect(name: str) -> float:
         ends = ({**middle, name: end} for end in box[name])
-        first, last = (closed_loop(plant, K, {n: float(v) for n, v in values.items()}) for values in ends)
+        first, last = (closed_loop(plant, K, _doubles(values)) for values in ends)
         return float(np.linalg.norm(inverse @ (last - first) @ V, 2))
 
     name = max(box, key=effect)

@@ -54,16 +54,19 @@ class Regulator:
     @property
     def S(self) -> Array:
         """B R⁻¹ Bᵀ (n, n)."""
-        return self.B @ np.linalg.solve(self.R, self.B.T)
+        S: Array = self.B @ np.linalg.solve(self.R, self.B.T)
+        return S
 
     @property
     def hamiltonian(self) -> Array:
         """M (2n, 2n) of (x, p)' = M (x, p): (4.1) and (4.3) with the optimal control (4.4)."""
-        return np.block([[self.A, -self.S], [-self.Q, -self.A.T]])
+        M: Array = np.block([[self.A, -self.S], [-self.Q, -self.A.T]])
+        return M
 
     def control(self, p: Array) -> Array:
         """u = −R⁻¹ Bᵀ p (m, …), Eq. (4.4)."""
-        return -np.linalg.solve(self.R, self.B.T @ p)
+        u: Array = -np.linalg.solve(self.R, self.B.T @ p)
+        return u
 
     def running_cost(self, x: Array, u: Array) -> Array:
         """½ (xᵀQx + uᵀRu) (k,) of states (n, k) and controls (m, k)."""
@@ -126,7 +129,7 @@ def stationary(regulator: Regulator) -> tuple[Array, Array]:
 
 
 def by_riccati(regulator: Regulator, x0: Array, t: Array) -> Arc:
-    """The optimal arc from x0 (n,) at t[0] as §4 has it: L backward from t[-1] by (4.7), then x' = (A − S L) x forward."""
+    """The optimal arc from x0 (n,) at t[0] as §4 has it: L backward from t[-1], then x' = (A − S L) x forward."""
     L, S = riccati_solution(regulator, t[-1] - t[0]), regulator.S
     solution = solve_ivp(
         lambda s, x: (regulator.A - S @ L(t[-1] - s)) @ x,

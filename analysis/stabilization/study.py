@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from itertools import product
 
@@ -16,7 +15,7 @@ from fmu_src.road.profiles import RoadParameters
 from fmu_src.vehicle.parameters import Car
 
 from ..polynomials import Array
-from .certified import Certified, Plant, around, certify, closed_loop
+from .certified import Certified, Plant, around, certify, growth
 from .full_car import car_plant, half_car_plant, strut_gain, varied_values
 from .half_car import Model, come_down, corrected, over_the_bump, printed, printed_control
 from .limit import Approach, approach
@@ -189,11 +188,6 @@ def robustness(plant: Plant, K: Array, values: dict[str, float]) -> Robustness:
         margins=margins(A, B, K) if nominal < 0.0 else None,
         certified=certify(plant, K, around(values, SPREAD)),
     )
-
-
-def growth(plant: Plant, K: Array, values: Mapping[str, float]) -> float:
-    """Largest real part of the eigenvalues of A + B K [1/s]."""
-    return float(np.linalg.eigvals(closed_loop(plant, K, values)).real.max())
 
 
 def lost_at(car: HalfCar) -> float:
