@@ -169,9 +169,15 @@ def text(result: Study) -> str:
                 ("λ", "plant", "growth", "worst", "gain ×", "phase", "σ(I + L)", "disk", "delay", "proved stable"),
                 [row for w in result.weighted for row in _robust_rows(w)],
             ),
-            f"On the car with its wheels the half car's control is unstable from λ = {readable(result.lost, 3)} N²/m².",
+            _lost(result.lost),
         ]
     )  # fmt: skip
+
+
+def _lost(lam: float) -> str:
+    if not np.isfinite(lam):
+        return "At all these weights the half car's control also holds the car with its wheels stable."
+    return f"On the car with its wheels the half car's control is unstable from λ = {readable(lam, 3)} N²/m²."
 
 
 def _model_row(s: Solution) -> tuple[str, ...]:

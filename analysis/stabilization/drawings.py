@@ -47,12 +47,12 @@ def subjects(result: Study) -> list[Subject]:
                 [partial(_forces, shown, axle) for axle in (0, 1)], behind),
         subject("printed", "What the misprints of (4.1) cost",
                 "Optimal stabilization (full) and no control (dashed): (4.1) corrected, with B as printed, whose two "
-                "controls are one, and wholly as printed, a saddle.",
+                "controls are one, and wholly as printed: a saddle, which one control can hardly hold.",
                 [partial(_models, result, *which) for which in COORDINATES], partial(_window, 0.0, end)),
         subject("limit", "From the finite to the infinite horizon",
                 "What is still missing of L∞ along the slowest mode, against the time to go; dashed: twice the slowest "
                 "decay of the closed loop.",
-                [partial(_limit, result.weighted)], partial(_window, 0.0, 6.0)),
+                [partial(_limit, result.weighted)], partial(_window, 0.0, 3.5)),
     ]  # fmt: skip
 
 
@@ -109,7 +109,7 @@ def _models(result: Study, k: int, name: str, ax: Axes) -> Axes:
 
 
 def _limit(weighted: Sequence[Weighted], ax: Axes) -> Axes:
-    for w, color in zip(weighted, cycle((BLUE, TEAL, RED, PURPLE, ORANGE)), strict=False):
+    for w, color in zip(weighted, cycle((BLUE, TEAL, RED, PURPLE, ORANGE, "#888888")), strict=False):
         a = w.approach
         ax.semilogy(a.s, a.gap, color=color, linestyle="-", label=_label(w.lam))
         ax.semilogy(a.s, a.gap[0] * np.exp(-a.rate * (a.s - a.s[0])), color="#222222", linestyle=DASHED, linewidth=0.8)

@@ -15,7 +15,7 @@ from scipy.optimize import brentq, minimize_scalar
 from ..polynomials import Array
 
 DECADES = (-2.0, 5.0)  # of the frequencies looked at [rad/s]
-PER_DECADE = 400
+PER_DECADE = 200
 MOST_GAIN = 1e6  # what the polynomials of a loop give beyond it is round-off: taken for none
 
 

@@ -65,8 +65,7 @@ class Regulator:
 
     def control(self, p: Array) -> Array:
         """u = −R⁻¹ Bᵀ p (m, …), Eq. (4.4)."""
-        u: Array = -np.linalg.solve(self.R, self.B.T @ p)
-        return u
+        return np.asarray(-np.linalg.solve(self.R, self.B.T @ p), dtype=float)
 
     def running_cost(self, x: Array, u: Array) -> Array:
         """½ (xᵀQx + uᵀRu) (k,) of states (n, k) and controls (m, k)."""
