@@ -98,6 +98,10 @@ def _parser() -> argparse.ArgumentParser:
     verb.add_argument("scenario", nargs="?", default="fourier-fl", help=f"{scenario} (default: fourier-fl)")
     verb.add_argument("-o", "--out", type=Path, metavar="DIR", help="folder for the table of the scan")
     verb.set_defaults(do=_spatial)
+
+    verb = verbs.add_parser("stabilize", help="optimal stabilization of section 4 and its robustness; needs no run")
+    verb.add_argument("-o", "--out", type=Path, metavar="DIR", help="also write stabilization.json and figures there")
+    verb.set_defaults(do=_stabilize)
     return parser
 
 
@@ -236,6 +240,12 @@ def _verify(options: argparse.Namespace) -> int:
     from .certificate_command import judge_certificate
 
     return judge_certificate(options.certificate)
+
+
+def _stabilize(options: argparse.Namespace) -> int:
+    from .stabilization.document import run
+
+    return run(options.out)
 
 
 def _leave(status: int) -> NoReturn:

@@ -1,0 +1,233 @@
+"""The study written down: a table for the terminal, JSON, findings and figures."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..errors import InputError
+from ..figures import readable, render
+from ..files import write_whole
+from ..findings import Finding
+from .certified import Certified
+from .drawings import subjects
+from .margins import Margins
+from .study import SPREAD, Robustness, Solution, Study, Weighted, study
+
+FILE = "stabilization.json"
+DEFAULT = "λ = 1e10 N²/m², H1 = 1 m, T = 2.3 s are this project's choice: the paper gives none."
+
+
+def run(folder: Path | None) -> int:
+    """Print the study and its findings, and write it into the folder, if one is given; 0 if all findings hold, else 1.
+
+    Raises InputError if the folder is a file.
+    """
+    if folder and folder.exists() and not folder.is_dir():
+        raise InputError(f"{folder}: wanted a folder, got a file; name another with -o")
+    result = study(progress=True)
+    print(text(result))
+    if folder:
+        for path in write(result, folder):
+            print(f"{path}: written")
+    made = findings(result)
+    print("\n".join(f.line for f in made))
+    return 0 if all(f.holds for f in made) else 1
+
+
+def write(result: Study, folder: Path) -> list[Path]:
+    """stabilization.json and the figures, each whole; returns their paths."""
+    folder.mkdir(parents=True, exist_ok=True)
+    contents = {
+        FILE: (json.dumps(as_json(result), indent=1, ensure_ascii=False) + "\n").encode(),
+        **{subject.file: render(subject) for subject in subjects(result)},
+    }
+    for name, content in contents.items():
+        write_whole(folder / name, content)
+    return [folder / name for name in contents]
+
+
+# ------------------------------------------------------------------ claims
+def findings(result: Study) -> list[Finding]:
+    """What the study must find, each with the number that decides."""
+    d, agreement = result.default, result.agreement
+
+    def finding(claim: str, equation: str, measured: float, expected: float, tolerance: float) -> Finding:
+        return Finding(
+            claim=claim,
+            equation=equation,
+            measured=measured,
+            expected=expected,
+            tolerance=tolerance,
+            unit="1",
+            source="python -m analysis stabilize",
+        )
+
+    L, largest = d.L, np.abs(d.L).max()
+    two_point = "difference over the largest value, against the two-point problem by exponentials"
+    made = [
+        finding(f"the arc by Riccati's equation: {two_point}", "(4.3)–(4.7)", agreement.riccati, 0.0, 1e-9),
+        finding(f"the arc by collocation: {two_point}", "(4.3)–(4.5)", agreement.collocation, 0.0, 1e-9),
+        finding("H is constant: its change over the running cost", "above (4.3)", agreement.hamiltonian, 0.0, 1e-9),
+        finding("½ x0ᵀ L(t_B2) x0 over the cost by quadrature", "(4.6)", d.cost / d.measured, 1.0, 1e-8),
+        finding("L(t) is positive semidefinite: least eigenvalue over largest entry, if < 0", "(4.7)",
+                float(min(np.linalg.eigvalsh(L).min() / largest, 0.0)), 0.0, 1e-12),
+    ]  # fmt: skip
+    for w in result.weighted:
+        at = f"λ = {w.lam:.0e}"
+        a = w.approach
+        made.append(
+            finding(f"{at}: rate of L(t) → L∞ over twice the slowest decay", "remark 4.1", a.fitted / a.rate, 1.0, 1e-3)
+        )
+        if w.half.margins:
+            short = min(w.half.margins.return_difference - 1.0, 0.0)
+            made.append(finding(f"{at}: least singular value of I + L, below 1", "remark 4.1", short, 0.0, 1e-9))
+        made.append(finding(f"{at}: half car proved stable within ± 30 %", "(4.1)", w.half.certified.proved, 1.0, 0.0))
+    return made
+
+
+# ------------------------------------------------------------------ JSON
+def as_json(result: Study) -> dict[str, Any]:
+    """All numbers, unrounded; what is infinite as null."""
+    return {
+        "note": DEFAULT,
+        "t_B2": result.begin,
+        "models": [_solution_json(s) for s in (result.default, *result.printed)],
+        "agreement": asdict(result.agreement),
+        "weights": [_weighted_json(w) for w in result.weighted],
+        "car unstable from lambda": _finite(result.lost),
+        "findings": [f.as_json() for f in findings(result)],
+    }
+
+
+def _solution_json(s: Solution) -> dict[str, Any]:
+    return {
+        "model": s.model.name,
+        "x0": s.arc.x[:, 0].tolist(),
+        "cost": s.cost,
+        "cost by quadrature": s.measured,
+        "largest control": s.peaks.tolist(),
+        "rank of B": int(np.linalg.matrix_rank(s.model.B)),
+        "growth of A": s.growth,
+        "energy to rest": _finite(s.energy_to_rest),
+    }
+
+
+def _weighted_json(w: Weighted) -> dict[str, Any]:
+    return {
+        "lambda": w.lam,
+        "cost": w.solution.cost,
+        "largest control": w.solution.peaks.tolist(),
+        "rate to the infinite horizon": {"expected": w.approach.rate, "fitted": w.approach.fitted},
+        "half car": _robustness_json(w.half),
+        "car": _robustness_json(w.car),
+    }
+
+
+def _robustness_json(r: Robustness) -> dict[str, Any]:
+    certified = asdict(r.certified)
+    return {"growth": r.growth, "worst growth": r.worst, "margins": _margins_json(r.margins), "certified": certified}
+
+
+def _margins_json(m: Margins | None) -> dict[str, Any] | None:
+    if m is None:
+        return None
+    loops = [{key: _finite(value) for key, value in asdict(loop).items()} for loop in m.loops]
+    return {
+        "loops": loops,
+        "return difference": m.return_difference,
+        "disk": m.disk,
+        "delay": _finite(m.delay),
+    }
+
+
+def _finite(value: float) -> float | None:
+    return value if np.isfinite(value) else None
+
+
+# ------------------------------------------------------------------ text
+def text(result: Study) -> str:
+    """The study for a terminal."""
+    models = (result.default, *result.printed)
+    return "\n\n".join(
+        [
+            DEFAULT,
+            "Half car behind the bump, by the equations used:\n" + _table(
+                ("(4.1)", "rank B", "growth of A", "J", "max |u1|", "max |u2|", "effort to rest"),
+                [_model_row(s) for s in models],
+            ),
+            "By λ, finite horizon:\n" + _table(
+                ("λ", "J", "max |u1|", "max |u2|", "L → L∞ by", "expected"),
+                [_weight_row(w) for w in result.weighted],
+            ),
+            f"u = K x broken at the actuators, and mass and stiffness ± {SPREAD:.0%}:\n" + _table(
+                ("λ", "plant", "growth", "worst", "gain ×", "phase", "σ(I + L)", "disk", "delay", "proved stable"),
+                [row for w in result.weighted for row in _robust_rows(w)],
+            ),
+            _lost(result.lost),
+        ]
+    )  # fmt: skip
+
+
+def _lost(lam: float) -> str:
+    if not np.isfinite(lam):
+        return "At all these weights the half car's control also holds the car with its wheels stable."
+    return f"On the car with its wheels the half car's control is unstable from λ = {readable(lam, 3)} N²/m²."
+
+
+def _model_row(s: Solution) -> tuple[str, ...]:
+    peaks = (f"{readable(u, 3)} N" for u in s.peaks)
+    rank = str(np.linalg.matrix_rank(s.model.B))
+    cost, effort = (f"{readable(value, 4)} N²s" for value in (s.cost, s.energy_to_rest))
+    return s.model.name, rank, f"{readable(s.growth, 3)} 1/s", cost, *peaks, effort
+
+
+def _weight_row(w: Weighted) -> tuple[str, ...]:
+    peaks = (f"{readable(u, 3)} N" for u in w.solution.peaks)
+    rates = (f"{readable(rate, 6)} 1/s" for rate in (w.approach.fitted, w.approach.rate))
+    return f"{w.lam:.0e}", f"{readable(w.solution.cost)} N²s", *peaks, *rates
+
+
+def _robust_rows(w: Weighted) -> list[tuple[str, ...]]:
+    return [_robust_row(f"{w.lam:.0e}", name, r) for name, r in (("half car", w.half), ("car", w.car))]
+
+
+def _robust_row(weight: str, name: str, r: Robustness) -> tuple[str, ...]:
+    growths = (f"{readable(value, 3)} 1/s" for value in (r.growth, r.worst))
+    return weight, name, *growths, *_margin_cells(r.margins), _proved(r.certified)
+
+
+def _margin_cells(m: Margins | None) -> tuple[str, ...]:
+    if m is None:
+        return ("—",) * 5
+
+    def least(value: float, write: Callable[[float], str]) -> str:
+        return write(value) if np.isfinite(value) else "any"
+
+    up, phase = min(loop.up for loop in m.loops), min(loop.phase for loop in m.loops)
+    down = max(loop.down for loop in m.loops)
+    return (
+        f"{readable(down, 3)} to {readable(up, 3)}",
+        least(phase, lambda value: f"{readable(value, 3)}°"),
+        readable(m.return_difference, 3),
+        readable(m.disk, 3),
+        least(m.delay, lambda value: f"{readable(1e3 * value, 3)} ms"),
+    )
+
+
+def _proved(c: Certified) -> str:
+    share = f"{100 * c.proved:.3g} % in {c.boxes}"
+    if c.witness is None:
+        return share
+    return f"{share}; not at " + ", ".join(f"{name} = {readable(value)}" for name, value in c.witness.items())
+
+
+def _table(columns: tuple[str, ...], rows: list[tuple[str, ...]]) -> str:
+    lines = [columns, *rows]
+    widths = [max(len(line[k]) for line in lines) for k in range(len(columns))]
+    return "\n".join("  ".join(cell.ljust(w) for cell, w in zip(line, widths, strict=True)).rstrip() for line in lines)

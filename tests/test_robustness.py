@@ -1,0 +1,270 @@
+"""How robust u = K x is: margins against closed forms and eigenvalues, stability proved over boxes of parameters."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
+
+import control
+import numpy as np
+import pytest
+from flint import arb_mat
+from numpy.testing import assert_allclose
+
+from analysis.car import car_form
+from analysis.stabilization.certified import _is_positive, around, certify, closed_loop, growth
+from analysis.stabilization.full_car import VARIED, car_plant, half_car_plant, strut_gain, varied_values
+from analysis.stabilization.half_car import corrected
+from analysis.stabilization.margins import Margins, loop_margins, margins
+from analysis.stabilization.regulator import Regulator, stationary
+from analysis.stabilization.study import WEIGHTS, lost_at
+from fmu_src.controller.design import design
+from fmu_src.controller.halfcar import HalfCar
+from fmu_src.controller.law import ControlParameters, control_law
+from fmu_src.vehicle.linear import linearized
+from fmu_src.vehicle.parameters import Car
+
+Array = np.ndarray[Any, Any]
+HALF_CAR, CAR = HalfCar(), Car()
+SHARP = 1e12  # λ at which the car with its wheels has small margins
+
+
+def gain_of(lam: float) -> Array:
+    return stationary(corrected(HALF_CAR).regulator(replace(HALF_CAR, lam=lam)))[1]
+
+
+@pytest.fixture(scope="module")
+def sharp() -> tuple[Array, Array, Array]:
+    """A, B, K of the car with its wheels under a strong control of the half car."""
+    linear = linearized(CAR)
+    return np.array(linear.A), np.array(linear.Bu), strut_gain(gain_of(SHARP))
+
+
+@pytest.fixture(scope="module")
+def sharp_margins(sharp: tuple[Array, Array, Array]) -> Margins:
+    return margins(*sharp)
+
+
+# ------------------------------------------------------------------ closed forms
+def test_margins_of_an_integrator() -> None:
+    """L = k/s: any gain > 0, 90°, a delay of π/2k; |1 + L| > 1, and (S − T)/2 is ½ everywhere."""
+    k = 3.0
+    found = margins(np.zeros((1, 1)), np.eye(1), np.array([[-k]]))
+    (loop,) = found.loops
+    assert (loop.down, loop.up) == (0.0, np.inf)
+    assert loop.phase == pytest.approx(90.0)
+    assert found.delay == pytest.approx(np.pi / (2 * k), rel=1e-9)
+    assert found.return_difference == pytest.approx(1.0, abs=1e-6)
+    assert found.disk == pytest.approx(2.0, rel=1e-9)
+
+
+def test_margins_of_three_lags() -> None:
+    """L = k/(s + 1)³ crosses −180° at ω = √3 with k/8, and the unit circle where (1 + ω²)^(3/2) = k."""
+    k = 4.0
+    A, B = np.eye(3, k=1) - np.eye(3), np.array([[0.0], [0.0], [1.0]])
+    found = margins(A, B, np.array([[-k, 0.0, 0.0]]))
+    omega = np.sqrt(k ** (2 / 3) - 1)
+    left = np.pi - 3 * np.arctan(omega)
+    assert found.loops[0].up == pytest.approx(8 / k, rel=1e-6)
+    assert found.loops[0].phase == pytest.approx(np.degrees(left), rel=1e-6)
+    assert found.delay == pytest.approx(left / omega, rel=1e-9)
+
+
+# ------------------------------------------------------------------ what theory promises
+def test_an_optimal_state_feedback_has_its_promised_margins(rng: np.random.Generator) -> None:
+    """R. E. Kalman's inequality, σ(I + L) ≥ 1 for R = ρ I: a gain from ½ to any, and 60° of phase, in each loop."""
+    for _ in range(4):
+        A, B = rng.normal(size=(4, 4)), rng.normal(size=(4, 2))
+        _, K = stationary(Regulator(A, B, np.eye(4), 0.3 * np.eye(2)))
+        found = margins(A, B, K)
+        assert found.return_difference > 1.0 - 1e-9
+        assert all(loop.down <= 0.5 and loop.up == np.inf and loop.phase >= 60.0 for loop in found.loops)
+
+
+def test_the_half_car_keeps_the_promise_and_the_car_with_wheels_does_not(sharp_margins: Margins) -> None:
+    model = corrected(HALF_CAR)
+    promised = margins(model.A, model.B, gain_of(SHARP))
+    assert promised.return_difference > 1.0 - 1e-9
+    assert min(loop.up for loop in promised.loops) == np.inf
+    assert sharp_margins.return_difference < 0.5
+    assert min(loop.up for loop in sharp_margins.loops) < 10.0
+
+
+# ------------------------------------------------------------------ against eigenvalues
+def test_at_a_margin_the_closed_loop_has_an_undamped_oscillation(
+    sharp: tuple[Array, Array, Array], sharp_margins: Margins
+) -> None:
+    A, B, K = sharp
+    for i, loop in enumerate(sharp_margins.loops):
+        for name, factor in (("gain", loop.up), ("phase", np.exp(-1j * np.radians(loop.phase)))):
+            changed = np.ones(4, complex)
+            changed[i] = factor
+            poles = np.linalg.eigvals(A + B @ (changed[:, None] * K))
+            assert np.abs(poles.real).min() < 1e-5 * np.abs(poles).max(), name
+    just = [
+        np.linalg.eigvals(A + B @ (np.where(np.arange(4) == 2, g, 1.0)[:, None] * K)).real.max() for g in (6.5, 6.7)
+    ]
+    assert just[0] < 0.0 < just[1]
+    assert 6.5 < sharp_margins.loops[2].up < 6.7
+
+
+def rightmost(A: Array, BK: Array, delay: float, points: int = 20) -> float:
+    """Largest real part of the roots of x' = A x + B K x(t − delay), by collocation of its semigroup's generator."""
+    n, k = len(A), np.arange(points + 1)
+    nodes = np.cos(np.pi * k / points)
+    c = np.where((k == 0) | (k == points), 2.0, 1.0) * (-1.0) ** k
+    D = np.outer(c, 1 / c) / (nodes[:, None] - nodes + np.eye(points + 1))
+    D -= np.diag(D.sum(axis=1))
+    generator = np.kron(2.0 / delay * D, np.eye(n))
+    generator[:n] = 0.0
+    generator[:n, :n], generator[:n, -n:] = A, BK
+    return float(np.linalg.eigvals(generator).real.max())
+
+
+def test_at_the_delay_margin_the_delayed_loop_is_on_the_verge(
+    sharp: tuple[Array, Array, Array], sharp_margins: Margins
+) -> None:
+    A, B, K = sharp
+    tau = sharp_margins.delay
+    assert rightmost(A, B @ K, 0.95 * tau) < -0.1
+    assert abs(rightmost(A, B @ K, tau)) < 1e-6
+    assert rightmost(A, B @ K, 1.05 * tau) > 0.1
+
+
+def test_a_loop_that_is_never_large_stands_any_delay() -> None:
+    model = corrected(HALF_CAR)
+    assert margins(model.A, model.B, gain_of(1e8)).delay == np.inf
+
+
+def test_no_change_below_the_disk_margin_makes_the_loop_unstable(
+    sharp: tuple[Array, Array, Array], sharp_margins: Margins, rng: np.random.Generator
+) -> None:
+    """Real and complex factors (1 + δ/2)/(1 − δ/2), |δ| < α, in all four loops at once; and one α reaches the verge."""
+    A, B, K = sharp
+
+    def worst(delta: Array) -> float:
+        factor = np.linalg.solve((np.eye(4) - delta / 2).T, (np.eye(4) + delta / 2).T).T
+        return float(np.linalg.eigvals(A + B @ factor @ K).real.max())
+
+    for _ in range(200):
+        delta = rng.normal(size=(4, 4)) + 1j * rng.normal(size=(4, 4))
+        assert worst(0.999 * sharp_margins.disk * delta / np.linalg.norm(delta, 2)) < 0.0
+    omega = np.linspace(40, 80, 4001)
+    peaks = [np.linalg.inv(np.eye(4) - K @ np.linalg.solve(1j * w * np.eye(14) - A, B)) - np.eye(4) / 2 for w in omega]
+    most = max(peaks, key=lambda peak: np.linalg.norm(peak, 2))
+    u, s, vh = np.linalg.svd(most)
+    assert 1 / s[0] == pytest.approx(sharp_margins.disk, rel=1e-4)
+    verge = np.outer(vh[0].conj(), u[:, 0].conj()) / s[0]
+    assert max(worst(1.001 * verge), worst(-1.001 * verge)) > 0.0 > max(worst(0.99 * verge), worst(-0.99 * verge))
+
+
+def test_the_disk_margin_of_one_loop_is_that_of_python_control() -> None:
+    A, B, K = np.eye(3, k=1) - np.eye(3), np.array([[0.0], [0.0], [1.0]]), np.array([[-4.0, 0.0, 0.0]])
+    alpha, _, _ = control.disk_margins(control.ss(A, B, -K, 0.0), np.linspace(1.2, 2.2, 4001))
+    assert margins(A, B, K).disk == pytest.approx(alpha, rel=1e-6)
+    assert loop_margins(A, B, K, 0).up == pytest.approx(2.0, rel=1e-6)
+
+
+# ------------------------------------------------------------------ the car
+def test_the_gain_by_struts_is_that_of_the_controller(rng: np.random.Generator) -> None:
+    made = design(HALF_CAR, infinite=True, span=None)
+    law = control_law(ControlParameters(horizon="infinite"), made)
+    gain = strut_gain(np.array(made.infinite).reshape(2, 4))
+    for x in rng.normal(size=(5, 14)):
+        assert_allclose(gain @ x, law(1.0, x.tolist()), rtol=1e-12)
+
+
+def test_the_closed_loop_is_that_of_the_standard_form() -> None:
+    gain = strut_gain(gain_of(1e10))
+    assert_allclose(
+        closed_loop(car_plant(CAR), gain, varied_values(CAR)),
+        car_form(CAR, gain=-gain, order=1).A,
+        rtol=1e-12,
+        atol=1e-9,
+    )
+
+
+@pytest.mark.parametrize("plant", [half_car_plant(HALF_CAR), car_plant(CAR)])
+def test_plants_are_affine_in_stiffness_and_in_the_reciprocal_of_mass(plant: Any) -> None:
+    """What the certificates rest on: between two values of one parameter the closed loop is a mean of its values."""
+    at = varied_values(CAR)
+    for name in VARIED:
+        low, high = 0.7 * at[name], 1.3 * at[name]
+        middle = 2 / (1 / low + 1 / high) if name == "m" else 0.5 * (low + high)
+        ends, between = ([plant({**at, name: v}) for v in values] for values in ((low, high), (middle,)))
+        for k in (0, 1):
+            assert_allclose(between[0][k], np.mean([end[k] for end in ends], axis=0), rtol=1e-13, atol=1e-12)
+    light, heavy = (np.array(plant({**at, "m": m * at["m"]})[1]) for m in (0.5, 1.0))
+    assert_allclose(light[np.abs(heavy).max(axis=1) > 0][0], 2 * heavy[np.abs(heavy).max(axis=1) > 0][0])
+
+
+def test_the_weight_from_which_wheels_make_the_control_unstable() -> None:
+    lam = lost_at(HALF_CAR)
+    assert WEIGHTS[0] < lam < WEIGHTS[-1]
+    rates = [growth(car_plant(CAR), strut_gain(gain_of(f * lam)), varied_values(CAR)) for f in (0.99, 1.01)]
+    assert rates[0] < 0.0 < rates[1]
+
+
+# ------------------------------------------------------------------ proved
+@pytest.mark.parametrize(
+    ("matrix", "positive"),
+    [
+        ([[2.0, 1.0], [1.0, 1.0]], True),
+        ([[1.0, 1.0], [1.0, 1.0]], False),
+        ([[1.0, 2.0], [2.0, 1.0]], False),
+        ([[-1.0, 0.0], [0.0, 1.0]], False),
+        ([[float("nan"), 0.0], [0.0, 1.0]], False),
+    ],
+)
+def test_a_matrix_of_balls_is_positive_only_if_it_surely_is(matrix: list[list[float]], positive: bool) -> None:
+    assert _is_positive(arb_mat(matrix)) is positive
+
+
+def pendulum(values: Mapping[str, Any]) -> Any:
+    """q'' = −c q − b q' + u."""
+    return [[0.0, 1.0], [-values["c"], -values["b"]]], [[0.0], [1.0]]
+
+
+NO_GAIN = np.zeros((1, 2))
+
+
+def test_a_box_that_is_stable_is_proved_in_as_many_parts_as_it_takes() -> None:
+    small = certify(pendulum, NO_GAIN, around({"c": 1.0, "b": 1.0}, 0.1))
+    large = certify(pendulum, NO_GAIN, around({"c": 1.0, "b": 1.0}, 0.9))
+    assert (small.proved, small.unstable, small.boxes) == (1.0, 0.0, 1)
+    assert (large.proved, large.unstable) == (1.0, 0.0)
+    assert large.boxes > 1
+
+
+def test_a_box_that_is_not_stable_is_never_proved() -> None:
+    """b from −0.5 to 1.5: a quarter of the box is unstable, and something near the border stays open."""
+    found = certify(pendulum, NO_GAIN, {**around({"c": 1.0}, 0.1), **around({"b": 0.5}, 2.0)})
+    assert 0.7 < found.proved < 0.75
+    assert 0.2 < found.unstable <= 0.25
+    assert found.witness is not None
+    assert found.witness["b"] <= 0.0
+
+
+def test_a_proof_ends_with_its_budget() -> None:
+    found = certify(pendulum, NO_GAIN, around({"c": 1.0, "b": 1.0}, 0.9), budget=1)
+    assert (found.proved, found.boxes) == (0.0, 1)
+
+
+def test_the_control_of_the_half_car_is_proved_stable_over_mass_and_stiffness(rng: np.random.Generator) -> None:
+    K = gain_of(HALF_CAR.lam)
+    for plant, gain, at in (
+        (half_car_plant(HALF_CAR), K, varied_values(HALF_CAR)),
+        (car_plant(CAR), strut_gain(K), varied_values(CAR)),
+    ):
+        assert certify(plant, gain, around(at, 0.3)).proved == 1.0
+        for factors in rng.uniform(0.7, 1.3, size=(50, 3)):
+            values = dict(zip(at, (factors * list(at.values())).tolist(), strict=True))
+            assert growth(plant, gain, values) < 0.0
+
+
+def test_beyond_a_weight_it_cannot_be_proved_for_the_car_with_wheels() -> None:
+    found = certify(car_plant(CAR), strut_gain(gain_of(5e12)), around(varied_values(CAR), 0.3), budget=60)
+    assert found.proved < 1.0
+    assert found.witness is not None
+    assert growth(car_plant(CAR), strut_gain(gain_of(5e12)), found.witness) >= 0.0
