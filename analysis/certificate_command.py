@@ -92,9 +92,10 @@ def statement(certificate: Certificate, proof: Proof) -> list[str]:
     lines = ["x_lin is almost stable (definition 2.1): for all t >= 0 and every eps >= l,"]
     for claim, floor in zip(certificate.claims, true.tolist(), strict=True):
         epsilon, delta = claim.table[-1].tolist()
+        ratio = f": ratio {claim.floor / floor:.4f}" if floor > 0.0 else ""
         lines.append(
-            f"  {claim.norm.name} norm: l = {claim.floor:.6g} (a reference motion reaches {floor:.6g}"
-            f"{f': ratio {claim.floor / floor:.4f}' if floor > 0.0 else ''}); delta up to {delta:.4g}, at eps = {epsilon:.4g}"
+            f"  {claim.norm.name} norm: l = {claim.floor:.6g} (a reference motion reaches {floor:.6g}{ratio}); "
+            f"delta up to {delta:.4g}, at eps = {epsilon:.4g}"
         )
     ends = "x -> 0 after the road's end" if proof.repetition is None else "every period's tube returns into itself"
     return [*lines, f"  {ends}", *_tubes(proof), *_tyres(parameters, proof)]

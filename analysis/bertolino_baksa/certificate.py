@@ -38,6 +38,7 @@ THEOREM = (
     "so; all numbers are SI and exact as printed."
 )
 Build = Callable[[dict[str, Any]], ExactSystem]
+Norms = Callable[[Array], tuple[Norm, ...]]
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,16 +77,11 @@ class Certificate:
 
 
 def certify(
-    model: dict[str, Any],
-    build: Build,
-    S: Array,
-    norms: Callable[[Array], tuple[Norm, ...]],
-    stops: Sequence[fmpq],
-    x0: Array,
+    model: dict[str, Any], build: Build, S: Array, norms: Norms, stops: Sequence[fmpq], x0: Array
 ) -> tuple[Certificate, Proof]:
     """Find pieces and the largest table of δ(ε) in each norm; norms are made from x_lin's values (n, …).
 
-    stops : ends of the pieces [s], in rising order: the first from which on the tail has no part in the floors is taken.
+    stops : ends of the pieces [s], rising: the first from which on the tail has no part in the floors is taken.
 
     Raises NotProvedError, with what failed, if there is no certificate.
     """
