@@ -272,8 +272,8 @@ def _condition() -> Row:
         derived="Re(α_k + ε(A_k + B_k)) < 0; the imaginary part shifts the frequency",
         evidence=[
             Evidence(
-                measure="largest error, over |A_k|, of what is compared with 0 as the rate at which |s_k| grows, default "
-                "car, sine road, over one wave",
+                measure="largest error, over |A_k|, of what is compared with 0 as the rate at which |s_k| grows, "
+                "default car, sine road, over one wave",
                 printed=float((np.abs(exponent - growth) / np.abs(A)).max()),
                 derived=float((np.abs(exponent.real - growth) / np.abs(A)).max()),
                 unit="1",
