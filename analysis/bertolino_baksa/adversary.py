@@ -76,17 +76,17 @@ def reference_floor(form: StandardForm, signal: Signal, norms: Sequence[Norm], x
 
 
 def worst(
-    form: StandardForm, signal: Signal, norm: Norm, x0: Array, delta: float, stop: float, seed: int = 0
+    form: StandardForm, signal: Signal, norm: Norm, x0: Array, delta: float, stop: float, rounds: int = ROUNDS
 ) -> tuple[float, Array]:
     """A large sup N(x − x_lin) over the starts with N(x(0) − x0) ≤ delta, and its start's offset (n,).
 
     The first starts are those that the linear part carries furthest, at many times; then a search around the worst.
     """
-    rng = np.random.default_rng(seed)
+    rng = np.random.default_rng(0)
     vertices = _vertices(form, norm, stop)
     crowd = np.concatenate([vertices, -vertices], axis=1) * delta
     best, at = 0.0, crowd[:, 0]
-    for k in range(ROUNDS + 1):
+    for k in range(rounds + 1):
         reached = excursions(form, signal, [norm], x0, crowd, stop)[0]
         if reached.max() > best:
             best, at = float(reached.max()), crowd[:, int(np.argmax(reached))]
