@@ -11,10 +11,8 @@ from .design import FILE_NAMES, Design, design, stored
 from .hardware import Loop, Memory
 from .law import CAR, CHOICES, HALF_CAR, HARDWARE, REALS, WEIGHTS, ControlParameters, control_law, control_parameters
 
-# The half car, the rest of the car (its yaw inertia plays no part), the cost, times and road, hardware.
-PARAMETER_NAMES = tuple(
-    dict.fromkeys([*HALF_CAR, *REALS, *(name for name in CAR if name != "Jz"), *WEIGHTS, *HARDWARE])
-)
+# The half car and its cost, times and road, the rest of the car, the other weights, hardware.
+PARAMETER_NAMES = tuple(dict.fromkeys([*HALF_CAR, *REALS, *CAR, *WEIGHTS, *HARDWARE]))
 
 
 class LqrController(Slave):
