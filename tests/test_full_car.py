@@ -14,7 +14,7 @@ from fmu_src.controller.design import Design, design, problem
 from fmu_src.controller.fullcar import FullCar
 from fmu_src.controller.halfcar import HalfCar
 from fmu_src.controller.law import ControlParameters, control_law, control_parameters
-from fmu_src.controller.riccati import check_weights, finite_horizon, flow, infinite_horizon, riccati_rate
+from fmu_src.controller.riccati import finite_horizon, flow, infinite_horizon, riccati_rate
 from fmu_src.quantities import ParameterError
 from fmu_src.vehicle.parameters import Car
 
@@ -162,19 +162,6 @@ def test_the_weight_of_acceleration_is_that_of_the_bodys_three_accelerations(rng
 def test_negative_weights_are_refused_by_name(name: str) -> None:
     with pytest.raises(ParameterError, match=rf"^{name} = -1\.0 \S+: wanted a finite number in \[0, inf\]"):
         control_parameters({"design": "full-car", name: -1.0})
-
-
-@pytest.mark.parametrize(
-    ("Q", "R", "said"),
-    [
-        (np.eye(2), np.diag([1.0, 0.0]), "R: wanted a positive definite matrix, got the eigenvalue 0"),
-        (np.diag([1.0, -1.0]), np.eye(2), "Q: wanted a positive semidefinite matrix, got the eigenvalue -1"),
-        (np.array([[1.0, 0.5], [0.0, 1.0]]), np.eye(2), "Q: wanted a symmetric matrix"),
-    ],
-)
-def test_weights_that_bound_no_cost_are_refused(Q: Array, R: Array, said: str) -> None:
-    with pytest.raises(ParameterError, match=said):
-        check_weights(Q, R)
 
 
 def test_an_undamped_car_without_weights_has_no_design_and_says_why() -> None:

@@ -17,7 +17,7 @@ from ..vehicle.parameters import Car
 from .fullcar import FullCar
 from .gain_table import Gain, GainTable, tabulated
 from .halfcar import HalfCar
-from .riccati import check_weights, flow, infinite_horizon, without_cross
+from .riccati import flow, infinite_horizon, without_cross
 
 if TYPE_CHECKING:
     from .riccati import Array
@@ -59,7 +59,6 @@ def problem(car: Model) -> tuple[Array, Array, Array, Array, Array]:
 
     A, B = np.array(car.A), np.array(car.B)
     Q, N, R = map(np.array, car.cost)
-    check_weights(Q, R, N)
     A, Q, K0 = without_cross(A, B, Q, R, N)
     return A, B, Q, R, K0
 

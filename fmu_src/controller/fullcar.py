@@ -12,7 +12,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, fields
 
-from ..quantities import PARAMETERS, refuse
+from ..quantities import PARAMETERS, Quantity, refuse
 from ..vehicle.linear import Matrix, extensions, linearized, wheel_heights
 from ..vehicle.parameters import Car
 
@@ -41,7 +41,7 @@ class FullCar:
         car = [(PARAMETERS[f.name], getattr(self.car, f.name)) for f in fields(Car)]
         return [f"{q.name} = {value!r} {q.unit}" for q, value in (*car, *self._weights()) if value != q.start]
 
-    def _weights(self) -> list[tuple]:
+    def _weights(self) -> list[tuple[Quantity, float]]:
         names = [f.name for f in fields(self) if f.name != "car"]
         return [(PARAMETERS["lambda" if name == "lam" else name], getattr(self, name)) for name in names]
 

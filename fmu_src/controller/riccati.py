@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
-from ..quantities import ParameterError, refuse
+from ..quantities import ParameterError
 
 if TYPE_CHECKING:
     import numpy as np
@@ -17,21 +17,6 @@ if TYPE_CHECKING:
 
 RESIDUAL = 1e-9  # of the algebraic equation, over its largest terms
 ROUND_OFF = 1e-12  # of poles, over the largest: closer to the imaginary axis they may lie on either side
-
-
-def check_weights(Q: Array, R: Array, N: Array | None = None) -> None:
-    """Raise ParameterError unless R is positive definite and [[Q, N], [Nᵀ, R]] symmetric and positive semidefinite."""
-    import numpy as np
-
-    faults = [f"{name}: wanted a symmetric matrix" for name, M in (("Q", Q), ("R", R)) if not np.allclose(M, M.T)]
-    if not (lowest := float(np.linalg.eigvalsh(R).min())) > 0.0:
-        faults.append(f"R: wanted a positive definite matrix, got the eigenvalue {lowest:g}")
-    elif not faults:
-        left = Q if N is None else Q - N @ np.linalg.solve(R, N.T)
-        values = np.linalg.eigvalsh(0.5 * (left + left.T))
-        if not values.min() >= -1e-12 * (np.abs(Q).max() or 1.0):
-            faults.append(f"Q: wanted a positive semidefinite matrix, got the eigenvalue {values.min():g}")
-    refuse(faults)
 
 
 def riccati_rate(L: Array, A: Array, B: Array, Q: Array, R: Array) -> Array:
