@@ -198,8 +198,9 @@ def _judge(run: Run, folder: Path) -> int:
     from .run_averaging import why_not_averaged
     from .run_series import series_findings
 
+    findings = check(run)
     of_series, why_no_series = series_findings(run)
-    findings = [*check(run), *of_series]
+    findings += of_series
     if why_no_series:
         print(f"the series in the small parameter is not compared with the run: {why_no_series}", file=sys.stderr)
     if reason := why_not_averaged(run):
@@ -221,8 +222,7 @@ def _report(options: argparse.Namespace) -> int:
 def _audit(options: argparse.Namespace) -> int:
     from .audit.document import audit, text, write
 
-    if options.out and options.out.exists() and not options.out.is_dir():
-        raise InputError(f"{options.out}: wanted a folder, got a file; name another with -o")
+    _wants_folder(options.out)
     result = audit(progress=True)
     print(text(result))
     if options.out:
@@ -231,10 +231,17 @@ def _audit(options: argparse.Namespace) -> int:
     return 0 if result.holds else 1
 
 
+def _wants_folder(out: Path | None) -> None:
+    """Refuse a file before anything is computed for it."""
+    if out and out.exists() and not out.is_dir():
+        raise InputError(f"{out}: wanted a folder, got a file; name another with -o")
+
+
 def _modes(options: argparse.Namespace) -> int:
     from .mode_report import run
     from .reference import car_of
 
+    _wants_folder(options.out)
     if options.scenario is None:
         return run(car_of({}), "the default car", "python -m analysis modes -o DIR", options.out)
     scenario = read_scenario(options.scenario)

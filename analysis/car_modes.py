@@ -38,12 +38,21 @@ class CarModes:
     names: tuple[str, ...]
     shares: Array
 
+    def pair(self, k: int) -> tuple[complex, complex]:
+        """The two eigenvalues of the mode k [1/s]; a real part that its disc does not tell from 0 is 0."""
+        both = [k, k + 7]
+        real = np.where(
+            np.abs(self.discs.centres[both].real) > self.discs.radii[both], self.discs.centres[both].real, 0.0
+        )
+        first, second = (real + 1j * self.discs.centres[both].imag).tolist()
+        return first, second
+
     def words(self, k: int) -> str:
         """Damped frequency and damping ratio of the mode k, or the rates at which an aperiodic pair decays."""
-        value, other = self.discs.centres[[k, k + 7]]
+        value, other = self.pair(k)
         if value.imag:
-            return f"{value.imag / (2.0 * np.pi):.3f} Hz, ζ = {-value.real / abs(value):.3f}"
-        return f"aperiodic, {-value.real:.4g} and {-other.real:.4g} 1/s".replace("-", "−")
+            return f"{value.imag / (2.0 * np.pi):.3f} Hz, ζ = {0.0 - value.real / abs(value):.3f}".replace("-", "−")
+        return f"aperiodic, {0.0 - value.real:.4g} and {0.0 - other.real:.4g} 1/s".replace("-", "−")
 
 
 def car_modes(car: Car) -> CarModes:

@@ -52,8 +52,8 @@ def rows(found: CarModes) -> list[tuple[str, ...]]:
         (
             found.names[k],
             found.words(k),
-            _times(*found.discs.centres[[k, k + 7]]),
-            _pair(*found.discs.centres[[k, k + 7]]),
+            _times(*found.pair(k)),
+            _pair(*found.pair(k)),
             f"{found.discs.radii[[k, k + 7]].max():.1e}",
             _shares(found, k),
         )
@@ -111,7 +111,7 @@ def _record(car: Car, found: CarModes, numbers: Quasilinear) -> dict[str, Any]:
             {
                 "name": found.names[k],
                 "damped_frequency_Hz": discs.centres[k].imag / (2.0 * np.pi),
-                "damping_ratio": -discs.centres[k].real / abs(discs.centres[k]),
+                "damping_ratio": 0.0 - found.pair(k)[0].real / abs(discs.centres[k]),
                 "kinetic_energy": dict(zip(MOTIONS, found.shares[k].tolist(), strict=True)),
             }
             for k in range(7)

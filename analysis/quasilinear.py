@@ -17,7 +17,7 @@ its different arrangements, up to the sign above. Indices count from 0 in code, 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, fields
 from itertools import permutations, product
 from types import SimpleNamespace
 from typing import Any
@@ -32,7 +32,7 @@ from fmu_src.vehicle.parameters import Car
 from .car import car_form
 from .polynomials import Array
 from .power_series import Monomial, cos, sin, variables
-from .standard_form import StandardForm
+from .standard_form import StandardForm, only
 
 FACTORS: dict[str, tuple[Quantity, ...]] = {
     "v": RATES,
@@ -156,12 +156,7 @@ def _expanded(car: Any, one: Any, tidy: Callable[[Any], Any]) -> Quasilinear:
 def quasilinear_form(car: Car, *, complete: bool = True) -> StandardForm:
     """(3.10) in the form (2.1): cubic; without the cubic stiffness, as in the paper, unless complete."""
     form = car_form(car, order=3)
-    if complete:
-        return form
-    (cubic,) = form.terms[1]
-    kept = (cubic.monomials >= len(POSITIONS)).any(axis=1)
-    part = replace(cubic, monomials=cubic.monomials[kept], coefficients=cubic.coefficients[:, kept])
-    return replace(form, terms={1: (part,)})
+    return form if complete else only(form, lambda monomial: max(monomial) >= len(POSITIONS))
 
 
 def _place(i: int, monomial: Monomial) -> tuple[str, tuple[int, ...]]:

@@ -50,7 +50,7 @@ def page(title: str, command: str, numbers: Quasilinear, modes: Sequence[Sequenc
             "",
             *_table(modes),
             "",
-            f"![The car in its seven modes]({picture})",
+            f"The same command draws the car in its seven modes: `{picture}`, beside this page.",
             "",
             PROOF,
             *(line for name in TERMS for line in _section(name, formulas[name], numbers[name])),

@@ -22,6 +22,7 @@ from .standard_form import StandardForm
 from .trajectory import Run
 
 FEWEST = 10  # rows after the road's last edge
+REST = 1e-12  # m, rad, m/s, rad/s; smaller motions are rounding
 LARGEST = 0.1  # of the motion, that averaging may leave out and still describe it
 
 
@@ -60,10 +61,14 @@ def stretch_of(run: Run) -> Stretch:
     if len(t) < FEWEST:
         raise InputError(f"the road changes its form until {signal.edges[-1]:g} s, and {len(t)} rows come after that")
     last = signal.pieces[-1]
+    if np.any(last.amplitudes[:, last.exponents == 0.0]):
+        raise InputError("the road stays at a height, around which averaging has no equations")
     piece, form = last if np.any(last.amplitudes) else None, car_form(car_of(run.parameters), order=3)
     equations = average(form, piece)
     x, m, w = run.trajectory.columns([q.name for q in STATES])[-len(t) :].T, equations.modes, equations.waves
     turned = (m.K_inverse @ x - w.forced @ w.at(t)) * np.exp(-1j * np.multiply.outer(m.beta, t))
+    if not np.abs(x).max() > REST:
+        raise InputError("the car rests")
     found = Stretch(t=t, x=x, amplitudes=turned, form=form, piece=piece, equations=equations)
     if not found.left_out <= LARGEST * found.size:
         raise InputError(

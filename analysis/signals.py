@@ -9,6 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from .errors import InputError
+
 Array = NDArray[np.float64]
 
 
@@ -46,7 +48,9 @@ class Signal:
         return [piece.begin for piece in self.pieces]
 
     def spans(self, t: Array) -> list[tuple[Piece, NDArray[np.bool_]]]:
-        """Each piece with the mask of the times t (n,), none before the signal's start, that lie in it."""
+        """Each piece with the mask of the times t (n,) that lie in it. Raises InputError for times before the first."""
+        if np.any(early := ~(t >= self.begin)):
+            raise InputError(f"t = {t[early][0]:g} s: wanted times not before the signal's start, {self.begin:g} s")
         index = np.searchsorted(self.edges, t, side="right") - 1
         return [(piece, index == i) for i, piece in enumerate(self.pieces)]
 

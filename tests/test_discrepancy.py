@@ -54,10 +54,21 @@ def test_the_discrepancy_of_exported_runs_is_of_order_3_in_the_amplitude(name: s
 @pytest.mark.parametrize("name", ["bump", "bump-lqr", "sine"])
 def test_both_claims_hold_on_honest_runs(name: str) -> None:
     run = simulate(replace(read_scenario(name), stop_time=0.8))
-    size, order = check(run)[2:]
+    size, order, *each = check(run)[2 : 4 + len(STATES)]
     assert size.holds and size.measured > 30.0 * size.tolerance  # it is seen, not lost in the tolerance
     assert order.holds and order.measured == pytest.approx(3.0, abs=0.01)
     assert "axle_r.roll at t = 0." in order.source
+    away = np.abs(run.trajectory.columns(NAMES) - linear_states(run))
+    for k, finding in enumerate(each):
+        assert NAMES[k] in finding.claim and f"[{STATES[k].unit}]" in finding.claim and finding.holds
+        assert finding.measured == pytest.approx(away[:, k].max())
+        assert f"at t = {run.trajectory.time[away[:, k].argmax()]:.4g} s" in finding.source
+
+
+def test_a_discrepancy_that_the_run_may_not_resolve_is_said_to_be_one() -> None:
+    run = run_at("bump", 1e-3)
+    assert "less than the run's own error may be" in check(run)[2].source
+    assert "less than" not in check(run_at("bump", 1.0))[2].source
 
 
 def test_forces_are_those_of_the_run_not_of_a_linear_loop() -> None:
@@ -100,7 +111,7 @@ def test_a_run_of_another_car_is_told_from_its_linear_approximation() -> None:
         component: {name: 15100.0 if name == "c1" else value for name, value in values.items()}
         for component, values in run.record["parameters"].items()
     }
-    motion, _, size, order = check(replace(run, record={**run.record, "parameters": parameters}))
+    motion, _, size, order, *_ = check(replace(run, record={**run.record, "parameters": parameters}))
     assert not motion.holds and not size.holds
     assert order.holds  # the order belongs to the car, not to the run
 
@@ -123,9 +134,10 @@ def test_no_order_is_claimed_of_a_motion_that_is_linear(start: dict[str, float])
     """A car of four equal corners in heave meets none of the nonlinear terms."""
     parameters: dict[str, float | str | bool] = {"profile": "flat", "enabled": False, "road_sampling": "end"}
     parameters |= {"a": 1.25, "b": 1.25, "c2": 15000.0, "b2": 1200.0}
-    found = check(simulate(Scenario(name="heave", start=start, stop_time=0.5, parameters=parameters)))
-    assert len(found) == 3 and all(finding.holds for finding in found)
-    assert found[2].measured < 1e-7  # over states that rest, and so over next to nothing
+    checked = check(simulate(Scenario(name="heave", start=start, stop_time=0.5, parameters=parameters)))
+    found = [finding for finding in checked if finding.equation == "(2.3)"]
+    assert len(found) == 1 + len(STATES) and all(finding.holds for finding in found)
+    assert found[0].measured < 1e-7  # over states that rest, and so over next to nothing
 
 
 def test_tiny_and_large_motions_have_their_order_taken_at_one_size() -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import re
 from fractions import Fraction
 from pathlib import Path
 from xml.etree import ElementTree
@@ -227,8 +228,13 @@ def test_the_command_fails_on_a_car_that_is_not_damped_and_refuses_what_it_canno
 ) -> None:
     (tmp_path / "undamped.toml").write_text("[parameters]\nb1 = 0.0\nb2 = 0.0\n")
     assert main(["modes", str(tmp_path / "undamped.toml")]) == 1
-    assert "FAILS: every motion of the linear part decays" in capsys.readouterr().out
+    out = capsys.readouterr().out
+    assert "FAILS: every motion of the linear part decays" in out
+    assert all("Hz, ζ = 0.000  ∞  " in re.sub(" {2,}", "  ", line) for line in out.splitlines()[1:8])  # no round-off
     assert main(["modes", "nonesuch"]) == 2
+    (tmp_path / "file").touch()
+    assert main(["modes", "bump", "-o", str(tmp_path / "file")]) == 2
+    assert "wanted a folder, got a file" in capsys.readouterr().err
     (tmp_path / "overdamped.toml").write_text("[parameters]\nb1 = 8000.0\n")
     assert main(["modes", str(tmp_path / "overdamped.toml")]) == 0
     assert "aperiodic, 281.5 and 3.107 1/s" in capsys.readouterr().out

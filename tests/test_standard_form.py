@@ -184,6 +184,15 @@ def test_any_time_alone_and_in_any_order() -> None:
     np.testing.assert_allclose(together, np.stack(alone, axis=1), rtol=1e-9, atol=1e-15)
 
 
+def test_there_is_nothing_before_the_signal() -> None:
+    form, w = car_form(Car(), order=1), road_signal(RoadParameters(), 1.0)
+    for t in (np.array([1.5, 0.5]), np.array([np.nan])):
+        with pytest.raises(InputError, match="not before the signal's start, 1 s"):
+            linear_response(form.A, form.B, np.zeros(14), w, t)
+        with pytest.raises(InputError, match="not before the signal's start"):
+            w(t)
+
+
 def test_resonance_and_defective_matrices_are_no_exception() -> None:
     """x'' + x = cos t grows like ½ t sin t; a critically damped mass has but one eigenvector."""
     t = np.linspace(0.0, 20.0, 41)

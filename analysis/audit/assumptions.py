@@ -108,6 +108,7 @@ def _axle_masses() -> Row:
     p, car = printed_car, Car()
     T = _axle_kinetic_energy()
     coupling = T.diff(p.dz2, p.dψ2)
+    moved, turned = (plain(sp.factor(factor)) for factor in (coupling, coupling.diff(p.ψ2)))
     numbers = {p.m21: 1.1 * car.m21, p.m22: car.m22, p.m2: car.m2, p.J2: car.J2, p.s2: car.s2, p.ψ2: 0.0}
     size = sp.sqrt(T.diff(p.dz2, 2) * T.diff(p.dψ2, 2)).subs(numbers)
     masses = 2.1 * car.m22
@@ -116,7 +117,7 @@ def _axle_masses() -> Row:
     return Row(
         equation="(3.4), (3.7)",
         printed="m21 and m22 may differ",
-        derived=f"+ {plain(sp.factor(coupling))} ψ̈2 in (3.4), and the same with z̈2 in (3.7), unless m21 = m22",
+        derived=f"+ {moved} ψ̈2 + {turned} ψ̇2² in (3.4), + {moved} z̈2 in (3.7), unless m21 = m22".replace("+ −", "− "),
         evidence=[
             Evidence(
                 measure="inertial coupling of z2 and ψ2 over the root of their masses, m21 = 1.1 m22",

@@ -155,7 +155,7 @@ def markdown(result: Audit) -> str:
     """The audit as the page of the docs."""
     columns = ("equation", "printed", "derived", "evidence: printed → derived", "verdict")
     short = ("equation", "printed", "derived", "evidence: printed → derived")
-    figures = "\n\n".join(f"![{s.title}]({s.file})\n\n{s.caption()}" for s in subjects())
+    figures = "\n".join(f"- `{s.file}`: {s.caption()}" for s in subjects())
     notes = [f"- {row.equation}: {row.note}" for row in result.rows if row.note]
     parts = [
         HEAD + "\n" + conventions(result),
@@ -167,7 +167,7 @@ def markdown(result: Audit) -> str:
         "Default car and bump (10 mm); the undefined m_z of (3.4) taken as m2; ψ2 of the print in the sense in which "
         "its road term drives it.",
         _table(*_split(_response_table(result))),
-        figures,
+        "The command draws beside this page:\n\n" + figures,
     ]
     return "\n\n".join(parts) + "\n"
 

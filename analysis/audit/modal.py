@@ -5,20 +5,18 @@ from __future__ import annotations
 from functools import cache
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fmu_src.road.profiles import RoadParameters
 from fmu_src.vehicle.parameters import Car
 
+from .. import modes as product
 from ..car import car_form
 from ..linear_response import periodic_response
-from ..polynomials import Array, Homogeneous
+from ..modes import Complex, Modes
+from ..polynomials import Homogeneous
 from ..signals import harmonic
 from ..standard_form import StandardForm
 from .rows import RIGHT, Evidence, Row
-
-Complex = NDArray[np.complex128]
-ROAD_11 = 14  # place of h11 in (x, h, ḣ)
 
 
 def rows() -> list[Row]:
@@ -38,22 +36,10 @@ def cubic_part() -> Homogeneous:
     return part
 
 
-def autonomous_tensor() -> Array:
-    """r_ijkl (14, 14, 14, 14), symmetric in j, k, l: R̄ with the cubic stiffness, as x' has it."""
-    part = cubic_part()
-    own = (part.monomials < ROAD_11).all(axis=1)
-    return Homogeneous(part.monomials[own], part.coefficients[:, own]).tensor(14)
-
-
 @cache
-def modes() -> tuple[Complex, Complex]:
-    """λ (14), those with β > 0 first and their conjugates in the same order, and K (14, 14)."""
-    values, vectors = np.linalg.eig(form().A)
-    upper = sorted(np.flatnonzero(values.imag > 0), key=lambda k: values[k].imag)
-    return (
-        np.concatenate([values[upper], values[upper].conj()]),
-        np.concatenate([vectors[:, upper], vectors[:, upper].conj()], axis=1),
-    )
+def modes() -> Modes:
+    """Of the default car."""
+    return product.modes(form().A)
 
 
 def omega() -> float:
@@ -64,7 +50,7 @@ def omega() -> float:
 @cache
 def gains() -> Complex:
     """γ_k1 (14): f_k = γ_k1 h11."""
-    return np.asarray(np.linalg.solve(modes()[1], form().B[:, 0]))
+    return modes().input(form().B)[:, 0]
 
 
 def printed_amplitude(lam: Complex, gain: Complex, w: float) -> tuple[Complex, Complex]:
@@ -74,7 +60,7 @@ def printed_amplitude(lam: Complex, gain: Complex, w: float) -> tuple[Complex, C
 
 def _wave_residual(amplitude: Complex, phase: Complex) -> float:
     """Largest |ξ' − λξ − γ sin Ωt|/|γ| of ξ = P sin(Ωt + ψ) over all modes and times."""
-    lam, _ = modes()
+    lam = modes().eigenvalues
     t = np.linspace(0.0, 2.0 * np.pi / omega(), 50)[:, None]
     angle = omega() * t + phase
     left = amplitude * (omega() * np.cos(angle) - lam * np.sin(angle)) - gains() * np.sin(omega() * t)
@@ -83,7 +69,7 @@ def _wave_residual(amplitude: Complex, phase: Complex) -> float:
 
 def _forced() -> Row:
     """Homogeneous ξ, which K⁻¹ (3.11) gives, and forced ξ, put into (3.13)."""
-    lam, _ = modes()
+    lam = modes().eigenvalues
     P, psi = printed_amplitude(lam, gains(), omega())
     t = 0.25 * 2.0 * np.pi / omega()  # f is largest
     free = np.exp(lam * t)
@@ -106,11 +92,10 @@ def _forced() -> Row:
 
 
 def _modal_matrix() -> Row:
-    lam, K = modes()
+    lam, K = modes().eigenvalues, modes().K
 
     def error(matrix: Complex) -> float:
-        product = np.linalg.solve(K, form().A @ matrix)
-        return float(np.abs(product - np.diag(lam)).max() / np.abs(lam).max())
+        return float(np.abs(np.linalg.solve(K, form().A @ matrix) - np.diag(lam)).max() / np.abs(lam).max())
 
     return Row(
         equation="after (3.14)",
@@ -130,7 +115,7 @@ def _modal_matrix() -> Row:
 
 
 def _steady() -> Row:
-    lam, K = modes()
+    lam, K = modes().eigenvalues, modes().K
     t = np.linspace(0.0, 2.0 * np.pi / omega(), 50)
     front_left = harmonic([-1j], omega())  # sin Ωt
     truth = np.linalg.solve(K, periodic_response(form().A, form().B[:, :1], front_left.pieces[0], t))

@@ -89,7 +89,8 @@ def rows() -> list[Row]:
         row(
             "remark 3.2",
             "λ_j + λ_k − λ_l = 0, λ_j + λ_k + λ_l − λ_m = 0",
-            "in an odd system β_j + β_k + β_l = β_m and β_j + β_k = β_l + β_m but by equal pairs; never the first",
+            "of the imaginary parts, in an odd system β_j + β_k + β_l = β_m and β_j + β_k = β_l + β_m but by equal "
+            "pairs; never the first",
             printed_internal,
             FREE,
         ),

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 
 import numpy as np
 
@@ -12,14 +12,15 @@ from fmu_src.vehicle.parameters import Car
 
 from ..derivation import COORDINATES
 from ..figures import readable
-from ..polynomials import Homogeneous
+from ..quasilinear import TERMS, quasilinear
 from . import modal
 from .car import discrepancy_order
-from .modal import ROAD_11, cubic_part, form
+from .modal import cubic_part, form
 from .rows import Evidence, Row
 from .system import Array, bump, derived
 
 SIZES = np.array([0.04, 0.02, 0.01])
+ROAD_11 = 14  # place of h11 in (x, h, ḣ)
 
 
 def rows() -> list[Row]:
@@ -27,22 +28,18 @@ def rows() -> list[Row]:
     return [_autonomous(), _stiffness(), _parametric(), *modal.rows(), _parameter(), _delay()]
 
 
-def _restricted(rates: int) -> Homogeneous:
-    """The terms of degree 3 in q and q̇ alone, with this many factors q̇."""
-    part = cubic_part()
-    own = (part.monomials < ROAD_11).all(axis=1) & ((part.monomials >= 7).sum(axis=1) == rates)
-    return Homogeneous(part.monomials[own], part.coefficients[:, own])
+CUBIC = ("c_ijkl", "b_ijkl", "m_ijkl")  # stiffness, damping, inertia
 
 
-def _raised_damping(x: Array) -> Array:
-    """The b-term as printed, b_ijkl q̇_j q̇_k q_l (14), with b_ijkl that of q̇_j q_k q_l, symmetric in k, l."""
-    q, v = x[:7], x[7:]
-    result = np.zeros(14)
-    part = _restricted(rates=1)
-    for column, monomial in zip(part.coefficients.T, np.sort(part.monomials, axis=1).tolist(), strict=True):
-        k, l, j = monomial[0], monomial[1], monomial[2] - 7  # noqa: E741  the paper's letters
-        result += column * v[j] * (v[k] * q[l] + v[l] * q[k]) / 2.0
-    return result
+def _term(name: str, x: Array, kinds: str = "") -> Array:
+    """One cubic term (14, …) of x' at x (14, …), q̈ = ± t_ijkl …; `kinds`: other factors than its own, q or v each."""
+    tensor, (own, sign) = quasilinear(Car())[name].dense(), TERMS[name]
+    values = np.einsum("ijkl,j...,k...,l...->i...", tensor, *({"q": x[:7], "v": x[7:]}[kind] for kind in kinds or own))
+    return sign * np.concatenate([np.zeros_like(values), values])
+
+
+def _sum(names: Iterable[str], x: Array) -> Array:
+    return np.sum([_term(name, x) for name in names], axis=0)
 
 
 def remainder_order(cubic: Callable[[Array], Array]) -> float:
@@ -57,11 +54,10 @@ def remainder_order(cubic: Callable[[Array], Array]) -> float:
 
 
 def _order_row(printed: Callable[[Array], Array]) -> Evidence:
-    terms = [_restricted(rates) for rates in range(3)]
     return Evidence(
         measure="order in the size of x of what the cubic equations leave of the full ones",
         printed=remainder_order(printed),
-        derived=remainder_order(lambda x: sum((part(x) for part in terms), np.zeros(14))),
+        derived=remainder_order(lambda x: _sum(CUBIC, x)),
         unit="1",
         expected=5.0,
         tolerance=0.2,
@@ -70,30 +66,28 @@ def _order_row(printed: Callable[[Array], Array]) -> Evidence:
 
 
 def _autonomous() -> Row:
-    stiffness, _, inertia = (_restricted(rates) for rates in range(3))
+    """The b-term with b_ijkl that of q̇_j q_k q_l, as below (3.9)."""
     return Row(
         equation="R̄_i",
         printed="− b̄_ijkl q̇_j q̇_k q_l",
         derived="− b̄_ijkl q̇_j q_k q_l, from B̄_ij(q) q̇_j",
-        evidence=[_order_row(lambda x: stiffness(x) + _raised_damping(x) + inertia(x))],
+        evidence=[_order_row(lambda x: _sum(("c_ijkl", "m_ijkl"), x) + _term("b_ijkl", x, "vvq"))],
         note="Evidence with the cubic stiffness put in, so that this term alone is judged.",
     )
 
 
 def _stiffness() -> Row:
-    stiffness, damping, inertia = (_restricted(rates) for rates in range(3))
     times = np.linspace(0.0, 2.0, 401)
     x = derived("A").over_the_bump(times, PARAMETERS["A"].start).T
-    values = [part(x) for part in (stiffness, damping, inertia)]
-    sizes = [np.linalg.norm(value, axis=0).max() for value in values]
+    sizes = [np.linalg.norm(_term(name, x), axis=0).max() for name in CUBIC]
     whole = cubic_part()(np.concatenate([x, np.zeros((8, x.shape[1]))]))
-    left_out = [np.linalg.norm(whole - sum(kept), axis=0).max() / sum(sizes) for kept in (values[1:], values)]
+    left_out = [np.linalg.norm(whole - _sum(kept, x), axis=0).max() / sum(sizes) for kept in (CUBIC[1:], CUBIC)]
     return Row(
         equation="C̄_i, R̄_i",
         printed="C̄_i = c̄_ij q_j; no cubic stiffness in R̄_i",
         derived="C̄_i = c̄_ij q_j + c̄_ijkl q_j q_k q_l, of the same order as the terms kept",
         evidence=[
-            _order_row(lambda x: damping(x) + inertia(x)),
+            _order_row(lambda x: _sum(CUBIC[1:], x)),
             Evidence(
                 measure="largest cubic acceleration on the bump that is left out, over the sum of all three kinds'",
                 printed=float(left_out[0]),
@@ -107,24 +101,12 @@ def _stiffness() -> Row:
     )
 
 
-def parametric_terms() -> list[tuple[int, tuple[int, ...], float]]:
-    """(row, monomial, coefficient) of all terms of degree ≤ 3 that hold both a road height and a coordinate."""
-    found = (entry for parts in form().terms.values() for part in parts for entry in part.entries())
-    return [(i, m, c) for i, m, c in found if min(m) < ROAD_11 <= max(m)]
-
-
-def _by_road(monomial: tuple[int, ...]) -> tuple[int, ...]:
-    """The same variables, the road's first."""
-    return tuple(sorted(monomial, key=lambda place: (place < ROAD_11, place)))
-
-
 def _parametric() -> Row:
-    terms = parametric_terms()
-    named = [
-        f"d_{i - 6}{m[0] - 13}{m[1] + 1}{m[2] + 1} = {readable(c)}"
-        for i, m, c in ((i, _by_road(m), c) for i, m, c in terms)
-    ]
-    own = {COORDINATES[i - 7].replace("psi", "ψ") for i, _, _ in terms}
+    found = (m for parts in form().terms.values() for part in parts for _, m, _ in part.entries())
+    terms = [m for m in found if min(m) < ROAD_11 <= max(m)]  # with a road height and a coordinate
+    d = quasilinear(Car())["d_ijkl"].entries
+    named = [f"d_{''.join(str(n + 1) for n in index)} = {readable(value)}" for index, value in d.items()]
+    own = {COORDINATES[i].replace("psi", "ψ") for i, *_ in d}
     return Row(
         equation="P_i(t, ξ), B_νij, B_νijk",
         printed="ε Σ B_νij ξ_j sin νΩt + ε Σ B_νijk ξ_j ξ_k sin νΩt for the front left wheel",
@@ -134,7 +116,7 @@ def _parametric() -> Row:
             Evidence(
                 measure="terms h·q, linear in the coordinates, that the print has and the car has",
                 printed=14.0 * 14.0,
-                derived=float(sum(len(m) == 2 for _, m, _ in terms)),
+                derived=float(sum(len(m) == 2 for m in terms)),
                 unit="1",
                 tolerance=0.0,
                 apart=1.0,
@@ -142,7 +124,7 @@ def _parametric() -> Row:
             Evidence(
                 measure="terms h11·q·q that the print has and the car has",
                 printed=14.0**3,
-                derived=float(sum(ROAD_11 in m for _, m, _ in terms)),
+                derived=float(sum(ROAD_11 in m for m in terms)),
                 unit="1",
                 tolerance=0.0,
                 apart=1.0,

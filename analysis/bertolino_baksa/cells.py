@@ -17,9 +17,9 @@ from .balls import Array, ExactSystem, above, matrix, rounded, two_norm
 from .norms import Metric, Norm
 from .tube import Outputs, Piece, Tube, enclosed_series
 
-CELLS, LATE_CELLS = 8, 2  # per piece, for e^(At) and the growth of perturbations: at first, and from
+CELLS, LATE_CELLS = 12, 3  # per piece, for e^(At) and the growth of perturbations: at first, and from
 LATE = 2.0  # times the slowest time constant on, when what oscillates fast has died out
-FINE = 96  # per piece, for the norm of e
+FINE = 288  # per piece, for the norm of e
 EPS = 1e-13  # relative: covers the roundings of a polynomial's or a product's value, over the sum of its terms' sizes
 
 

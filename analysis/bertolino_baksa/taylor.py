@@ -11,7 +11,7 @@ from flint import arb, arb_mat, arb_series, fmpq
 from .balls import ExactSystem, NotProvedError, coefficients, column, cosine, jacobian, precision, sine
 from .tube import Piece
 
-DEGREE = 22
+DEGREE = 30
 LAST_TERM = 1e-14  # of a polynomial, over the size of the motion: it sets the length of a piece
 LONGEST, SHORTEST = 0.25, 1e-5  # s
 
