@@ -160,7 +160,7 @@ def build_fmu(model: str, package: Path, target: Path) -> None:
         script.write_text(ENTRY.format(model=model, module=MODELS[model], package=name, identity=identity))
         files = [folder / name]
         if model == "LqrController":
-            files.append(store_default_design(folder))
+            files += store_default_designs(folder)
         try:
             made = FmuBuilder.build_FMU(script, folder / "made", project_files=files)
         finally:
@@ -171,12 +171,13 @@ def build_fmu(model: str, package: Path, target: Path) -> None:
     write_archive(target, contents)
 
 
-def store_default_design(folder: Path) -> Path:
+def store_default_designs(folder: Path) -> list[Path]:
     """Design the controller for the default parameters, so that the FMU as shipped needs no numeric library."""
-    from fmu_src.controller import design, halfcar
+    from fmu_src.controller.design import design, store
+    from fmu_src.controller.fullcar import FullCar
+    from fmu_src.controller.halfcar import HalfCar
 
-    design.store(design.design(halfcar.HalfCar(), infinite=True, span=float("inf")), folder)
-    return folder / design.FILE_NAME
+    return [store(design(car, infinite=True, span=float("inf")), folder) for car in (HalfCar(), FullCar())]
 
 
 def write_archive(target: Path, contents: dict[str, bytes]) -> None:

@@ -64,6 +64,10 @@ def _parser() -> argparse.ArgumentParser:
     verb.add_argument("run", type=Path, metavar="RUN", help="run folder")
     verb.set_defaults(do=_report)
 
+    verb = verbs.add_parser("ride", help="how runs ride: settling, ISO 2631, tyre loads, energy, side by side")
+    verb.add_argument("runs", type=Path, metavar="RUN", nargs="+", help="run folders")
+    verb.set_defaults(do=_ride)
+
     verb = verbs.add_parser("audit", help="audit the equations and claims of the paper; needs no run")
     verb.add_argument("-o", "--out", type=Path, metavar="DIR", help="also write audit.md, audit.json and figures there")
     verb.set_defaults(do=_audit)
@@ -152,6 +156,17 @@ def _run(options: argparse.Namespace) -> int:
         write_report(folder)
     print(f"{target / 'report.html'}: written")
     return verdict
+
+
+def _ride(options: argparse.Namespace) -> int:
+    from .ride import ride, table
+
+    rows = table([ride(read_run(folder)) for folder in options.runs])
+    print("| | unit |", " | ".join(folder.resolve().name for folder in options.runs), "|")
+    print("|---|---|" + "---:|" * len(options.runs))
+    for words, unit, values in rows:
+        print(f"| {words} | {unit} |", " | ".join(f"{v:.3g}" if v == v else "not in this run" for v in values), "|")
+    return 0
 
 
 def _compare_fmus(scenario: str, run: Run) -> None:

@@ -11,6 +11,7 @@ import numpy as np
 from scipy.interpolate import CubicHermiteSpline
 
 from fmu_src.quantities import FORCES, ROAD_HEIGHTS, STATES, STRUT_TRAVELS
+from fmu_src.vehicle import equations
 from fmu_src.vehicle.parameters import Car
 
 from .recorded_road import recorded_road
@@ -51,12 +52,7 @@ def tyre_heights(car: Car, x: Array) -> tuple[Array, Array]:
 
 def strut_rates(car: Car, x: Array) -> Array:
     """Rates of strut travel Δ̇ [m/s] (n, 4)."""
-    _, psi, phi, _, _, _, psi2 = x[:, :7].T
-    dz, dpsi, dphi, dz11, dz12, dz2, dpsi2 = x[:, 7:].T
-    lift = np.cos(psi) * np.cos(phi) * dpsi - np.sin(psi) * np.sin(phi) * dphi
-    front, rear = dz - car.a * np.cos(phi) * dphi, dz + car.b * np.cos(phi) * dphi - dz2
-    roll = car.s0 * (lift - np.cos(psi2) * dpsi2)
-    return np.column_stack([front + car.s1 * lift - dz11, front - car.s1 * lift - dz12, rear + roll, rear - roll])
+    return np.column_stack(equations.strut_rates(car, np.sin, np.cos)(x[:, :7].T, x[:, 7:].T))
 
 
 def balance(car: Car, trajectory: Trajectory) -> Balance:

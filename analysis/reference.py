@@ -15,9 +15,8 @@ import numpy as np
 from scipy.integrate import solve_ivp
 
 from fmu_src.controller.design import design
-from fmu_src.controller.halfcar import HalfCar
-from fmu_src.controller.law import ACTIVATION, HORIZON, ControlParameters, control_law
-from fmu_src.controller.lqr_controller import HALF_CAR
+from fmu_src.controller.hardware import NONE, Forces, Loop, Memory
+from fmu_src.controller.law import SNAP, ControlParameters, control_law, control_parameters
 from fmu_src.quantities import CORNERS, PARAMETERS, STATES
 from fmu_src.road.profiles import HARMONICS, PROFILE, Road, RoadParameters, road
 from fmu_src.vehicle.equations import equations_of_motion
@@ -28,6 +27,7 @@ from .scenario import Scenario
 from .trajectory import Array
 
 Parameters = dict[str, float | str | bool]
+Command = Callable[[float, Sequence[float]], Sequence[float]]
 NUDGE = 1e-10  # s; inputs within a segment are taken this far inside it, on the segment's own side of a corner
 
 
@@ -53,42 +53,71 @@ def road_parameters(parameters: Parameters) -> RoadParameters:
     )
 
 
-def control_of(parameters: Parameters) -> ControlParameters:
-    """The control that these parameters describe; defaults where they are silent."""
-    names = ("T", "t_on", "v0", "Lambda", "tau0", "t_start")
-    half_car = {field: float(parameters.get(name, PARAMETERS[name].start)) for name, field in HALF_CAR.items()}
-    return ControlParameters(
-        car=HalfCar(**half_car),
-        enabled=bool(parameters.get("enabled", True)),
-        horizon=str(parameters.get(HORIZON.name, HORIZON.start)),
-        activation=str(parameters.get(ACTIVATION.name, ACTIVATION.start)),
-        **{name: float(parameters.get(name, PARAMETERS[name].start)) for name in names},
-    )
-
-
 @cache
-def _law(p: ControlParameters) -> Callable[[float, Sequence[float]], Sequence[float]]:
+def _law(p: ControlParameters) -> Callable[[float, Sequence[float]], Forces]:
     """The control law with gains designed anew, not read from the FMU."""
     finite = p.horizon == "finite"
-    made = design(p.car, infinite=not finite, span=p.end - p.begin if finite else None) if p.enabled else None
+    made = design(p.model, infinite=not finite, span=p.end - p.begin if finite else None) if p.enabled else None
     return control_law(p, made)
 
 
 def closed_loop(scenario: Scenario, times: Array, *, rtol: float = 1e-12) -> Array:
-    """The 14 states at `times` (n,) of car, road and continuously acting controller as one system; shape (n, 14)."""
-    control = control_of(scenario.parameters)
-    switches = [t for t in (control.begin, control.end) if control.enabled and t < times[-1]]
-    x0 = np.array([scenario.start.get(q.name, 0.0) for q in STATES])
-    return integrate(scenario.parameters, _law(control), switches, x0, times, rtol=rtol)
+    """The 14 states at `times` (n,) of car, road and controller as one system; shape (n, 14).
+
+    The controller acts continuously, or with a sample time at its samples; the forces of lagging actuators are states
+    of the system.
+    """
+    control = control_parameters(scenario.parameters)
+    loop, lag = Loop(control.hardware, _law(control)), control.hardware.actuator_lag
+    x0 = [scenario.start.get(q.name, 0.0) for q in STATES]
+    y0 = np.array([*x0, *NONE] if lag else x0)
+
+    def path(command: Command, switches: Sequence[float], y: Array, at: Array) -> Array:
+        def lagging(t: float, y: Sequence[float]) -> list[float]:
+            return [(u - f) / lag for u, f in zip(command(t, y), y[14:], strict=True)]
+
+        def forces(t: float, y: Sequence[float]) -> Forces:
+            return loop.passed(y, _four(y[14:] if lag else command(t, y)))
+
+        return integrate(scenario.parameters, forces, switches, y, at, rtol=rtol, rest=lagging if lag else None)
+
+    if not control.hardware.sample_time:
+        switches = [t - SNAP for t in (control.begin, control.end) if control.enabled and t < times[-1]]
+        return path(loop.command, switches, y0, times)[:, :14]
+    return _sampled(loop, path, y0, times, control.hardware.sample_time)[:, :14]
+
+
+def _sampled(loop: Loop, path: Callable[..., Array], y: Array, times: Array, sample_time: float) -> Array:
+    """Rows (n, …) at `times` from y on, with the command held from sample to sample."""
+    found, memory = np.empty((len(times), len(y))), Memory()
+    found[0] = y
+    numbers = range(loop.number(times[0]) + 1, loop.number(times[-1]) + 1)
+    for begin, end in pairwise([times[0], *(sample_time * n for n in numbers), times[-1]]):
+        if len(y) > 14:
+            memory = memory._replace(reached=_four(y[14:].tolist()))
+        memory = loop.sampled(begin, y[:14].tolist(), memory)
+        if end - begin > NUDGE:
+            within = (times > begin + NUDGE) & (times < end + NUDGE)
+            at = np.unique(np.array([begin, *times[within].clip(max=end), end]))
+            held = memory.command
+            rows = path(lambda t, y, held=held: held, [], y, at)
+            found[within], y = rows[1 : 1 + np.count_nonzero(within)], rows[-1]
+    return found
+
+
+def _four(values: Sequence[float]) -> Forces:
+    u11, u12, u21, u22 = values
+    return u11, u12, u21, u22
 
 
 def outputs(scenario: Scenario, times: Array, states: Array) -> Array:
     """All outputs of car, road and controller in each row, from its time and states.
 
     As a co-simulation records them: accelerations at the end of a step are those under the forces held over it.
+    Forces are those of the law itself, without the hardware that may stand behind it.
     """
     ground, motion = road_of(scenario.parameters), equations_of_motion(car_of(scenario.parameters))
-    law = _law(control_of(scenario.parameters))
+    law = _law(control_parameters(scenario.parameters))
     rows: list[tuple[float, ...]] = []
     held: Sequence[float] | None = None
     for t, x in zip(times.tolist(), states.tolist(), strict=True):
@@ -107,15 +136,19 @@ def integrate(
     times: Array,
     *,
     rtol: float = 1e-12,
+    rest: Command | None = None,
 ) -> Array:
-    """States (n, 14) at `times` (n,), from x0 at times[0], under forces(t, x) [N] that jump only at `switches` [s]."""
+    """States (n, 14) at `times` (n,), from x0 at times[0], under forces(t, x) [N] that jump only at `switches` [s].
+
+    With `rest`, their rates as a function of time and all states, x0 has further states behind the car's 14.
+    """
     ground, motion = road_of(parameters), equations_of_motion(car_of(parameters))
 
     def rate(t: float, y: Array) -> list[float]:
         state = y.tolist()
-        q, v = state[:7], state[7:]
+        q, v = state[:7], state[7:14]
         accelerations, _, _ = motion(q, v, forces(t, state), ground.heights(t), ground.rates(t))
-        return [*v, *accelerations]
+        return [*v, *accelerations, *(rest(t, state) if rest else ())]
 
     return in_stretches(rate, [*ground.corners(times[-1]), *switches], x0, times, rtol=rtol)
 

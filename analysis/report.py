@@ -24,6 +24,7 @@ from .errors import InputError
 from .figures import READING, readable
 from .files import write_whole
 from .findings import Finding
+from .ride import BAND, lacking, ride, table
 from .trajectory import COUNTERPART, FINDINGS, RECORD, Run, Trajectory, read_run
 from .tyres import static_loads, time_below_zero, tyre_loads
 
@@ -34,7 +35,7 @@ WORDS = {
     for component in (RoadExcitation, Vehicle7DOF, LqrController)
     for name, text in [*component.switches.items(), *((choice.name, choice.text) for choice in component.choices)]
 }
-GREEK = {"psi": "ψ", "varphi": "φ", "Lambda": "Λ", "lambda": "λ", "tau": "τ", "Delta": "Δ", "beta": "β"}
+GREEK = {"psi": "ψ", "varphi": "φ", "Lambda": "Λ", "lambda": "λ", "tau": "τ", "Delta": "Δ", "beta": "β", "sigma": "σ"}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -71,6 +72,14 @@ class Parameter:
     text: str
 
 
+@dataclass(frozen=True, slots=True)
+class RideTable:
+    """How runs ride: a heading for each, and rows of words, unit and one number for each."""
+
+    headings: list[str]
+    rows: list[tuple[str, str, list[float]]]
+
+
 def write_report(run_folder: Path) -> Path:
     """Draw the figures of a run into its folder and write report.html there; returns its path.
 
@@ -94,7 +103,9 @@ def write_report(run_folder: Path) -> Path:
         figures=[(entry, _as_data(run_folder / run_figures.FOLDER / entry.file)) for entry in entries],
         left_out=run_figures.left_out(run, counterpart),
         counterpart=counterpart is not None,
+        rides=ride_columns(run, counterpart),
         parameters=parameter_table(run),
+        band=BAND,
         fmus=run.record["fmus"],
         versions=run.record.get("versions", {}),
     )
@@ -175,7 +186,33 @@ def control_words(run: Run) -> str:
     begin = "the come-down of the last wheel"
     if known.get("activation") == "at t_on":
         begin = "t = {:g} s".format(*run.reals("t_on"))
-    return f"controller on ({horizon}, from {begin})"
+    words = [f"{known['design']} design"] if "design" in known else []
+    return f"controller on ({', '.join([*words, horizon, *hardware_words(run)])}, from {begin})"
+
+
+def hardware_words(run: Run) -> list[str]:
+    """What stands between the law and the struts, if anything does."""
+    known, found = run.parameters, []
+    if known.get("actuators") == "semi-active":
+        found.append("semi-active")
+    if known.get("feedback") == "estimate":
+        found.append("from estimates")
+    for name, factor, text in (
+        ("force_limit", 1.0, "forces up to {:g} N"),
+        ("actuator_lag", 1e3, "lag {:g} ms"),
+        ("sample_time", 1e3, "samples every {:g} ms"),
+    ):
+        if known.get(name):
+            found.append(text.format(factor * run.reals(name)[0]))
+    return found
+
+
+def ride_columns(run: Run, counterpart: Run | None) -> RideTable | None:
+    """The table that compares a run with its counterpart; None without one, or where columns were not recorded."""
+    if counterpart is None or lacking(run) or lacking(counterpart):
+        return None
+    both = [run, counterpart]
+    return RideTable([control_words(each) for each in both], table([ride(each) for each in both]))
 
 
 def road_words(run: Run) -> str:

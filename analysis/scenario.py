@@ -10,6 +10,7 @@ A real value is a number in SI units, or a string with its unit: "36 km/h", "20 
 
 from __future__ import annotations
 
+import contextlib
 import math
 import re
 import reprlib
@@ -19,8 +20,9 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
+from fmu_src.controller.law import control_parameters
 from fmu_src.controller.lqr_controller import LqrController
-from fmu_src.quantities import PARAMETERS, STATES, Choice, Quantity
+from fmu_src.quantities import PARAMETERS, STATES, Choice, ParameterError, Quantity
 from fmu_src.road.road_excitation import RoadExcitation
 from fmu_src.vehicle.vehicle7dof import Vehicle7DOF
 
@@ -132,6 +134,7 @@ def _checked(data: Any, path: Path, text: str, *, flat: bool) -> Scenario:
         **times,
     )
     check.span(scenario)
+    check.control(scenario)
     check.conclude()
     return scenario
 
@@ -187,12 +190,10 @@ class _Check:
         try:
             number = _in_si(value, q.unit)
         except ValueError as error:
-            self.fault(
-                section,
-                q.name,
-                f"{q.name} = {_shown(value)}: wanted {q.text} in {q.unit} (a number, or a string like "
-                f"'{q.start:g} {q.unit}'), {error}",
+            wanted = (
+                f"in {q.unit} (a number, or a string like '{q.start:g} {q.unit}')" if q.unit != "1" else "(a number)"
             )
+            self.fault(section, q.name, f"{q.name} = {_shown(value)}: wanted {q.text} {wanted}, {error}")
             return math.nan
         if fault := q.fault(number):
             self.fault(section, q.name, fault)
@@ -238,6 +239,17 @@ class _Check:
                 f"step = {s.step!r} s: wanted at least {TIMES_PER_STEP * math.ulp(latest):.1g} s, "
                 f"{TIMES_PER_STEP} times what a double resolves at t = {latest!r} s",
             )
+
+    def control(self, s: Scenario) -> None:
+        """Whether control lasts a step; what else may be wrong with it, the controller says in its own words."""
+        with contextlib.suppress(ParameterError):
+            p = control_parameters(s.parameters)
+            if p.enabled and p.end - p.begin < s.step:
+                self.fault(
+                    "parameters",
+                    "T",
+                    f"T = {p.end!r} s: wanted at least a step of {s.step!r} s of control, begun at {p.begin:g} s",
+                )
 
 
 def _shown(value: Any) -> str:

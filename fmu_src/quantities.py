@@ -83,6 +83,9 @@ UNITS: dict[str, dict[str, int]] = {
     "N/m": {"kg": 1, "s": -2},
     "N.s/m": {"kg": 1, "s": -1},
     "N2/m2": {"kg": 2, "s": -4},
+    "N2.s2/m2": {"kg": 2, "s": -2},
+    "kg2": {"kg": 2},
+    "1": {},
 }
 
 
@@ -176,6 +179,75 @@ ROAD_BOWS = _corner_quantities(
 ROAD = ROAD_HEIGHTS + ROAD_RATES + ROAD_BOWS
 FORCES = _corner_quantities("force_{}", "N", r"u_{{{}}}", "actuator force, up on the body and down on the wheel", 100.0)
 
+# ------------------------------------------------------------------ the controller of a real car; 0: without
+FULL_CAR_WEIGHTS = (
+    Quantity(name="H2", unit="m", symbol="H_2", text="weight of roll against heave, full car", start=1.0, low=0.0),
+    Quantity(
+        name="lambda_travel", unit="N2/m2", symbol=r"\lambda_s", text="weight of each strut's travel, full car", low=0.0
+    ),
+    Quantity(
+        name="lambda_tyre",
+        unit="N2/m2",
+        symbol=r"\lambda_t",
+        text="weight of each tyre's deflection, full car",
+        low=0.0,
+    ),
+    Quantity(
+        name="lambda_hop", unit="N2.s2/m2", symbol=r"\lambda_w", text="weight of each wheel's speed, full car", low=0.0
+    ),
+    Quantity(
+        name="lambda_acceleration",
+        unit="kg2",
+        symbol=r"\lambda_a",
+        text="weight of heave acceleration, with H1 and H2 of pitch and roll acceleration, full car",
+        low=0.0,
+    ),
+)
+HARDWARE = (
+    Quantity(name="force_limit", unit="N", symbol="u_{max}", text="largest force of an actuator; 0: no limit", low=0.0),
+    Quantity(name="actuator_lag", unit="s", symbol=r"\tau_a", text="time constant of the actuators; 0: none", low=0.0),
+    Quantity(
+        name="valve_damping",
+        unit="N.s/m",
+        symbol="b_{max}",
+        text="damping of a semi-active actuator with its valve shut",
+        start=5000.0,
+        positive=True,
+    ),
+    Quantity(
+        name="sample_time",
+        unit="s",
+        symbol="T_s",
+        text="time between samples, whose forces are held; 0: every communication point",
+        low=0.0,
+    ),
+    Quantity(
+        name="sigma_acceleration",
+        unit="m/s2",
+        symbol=r"\sigma_a",
+        text="noise of the accelerometers, standard deviation",
+        start=0.05,
+        positive=True,
+    ),
+    Quantity(
+        name="sigma_travel",
+        unit="m",
+        symbol=r"\sigma_s",
+        text="noise of the strut travel sensors, standard deviation",
+        start=5e-4,
+        positive=True,
+    ),
+    Quantity(
+        name="sigma_road",
+        unit="m",
+        symbol=r"\sigma_h",
+        text="road height that the filter reckons with, anew for each sample and wheel, standard deviation",
+        start=3e-3,
+        positive=True,
+    ),
+    Quantity(name="seed", unit="1", symbol="n", text="which noise: the same number, the same noise", start=1.0),
+)
+
 # ------------------------------------------------------------------ parameters; defaults: representative of a small car
 PARAMETERS = {
     q.name: q
@@ -226,6 +298,8 @@ PARAMETERS = {
         Quantity(name="H1", unit="m", symbol="H_1", text="weight of pitch against heave", start=1.0, low=0.0),
         Quantity(name="T", unit="s", symbol="T", text="end of the finite control horizon", start=2.3),
         Quantity(name="t_on", unit="s", symbol="t_{on}", text="start of control if activation = at t_on", start=0.3),
+        *FULL_CAR_WEIGHTS,
+        *HARDWARE,
     )
 }
 

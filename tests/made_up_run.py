@@ -30,7 +30,14 @@ def made_up_run(
     parameters = {
         "road": {"profile": "bump", **{name: PARAMETERS[name].start for name in ROAD_NAMES}, "excite_fl": True},
         "vehicle": {name: PARAMETERS[name].start for name in CAR},
-        "controller": {"lambda": 1e10, "T": 2.3, "horizon": "finite", "activation": "come-down", "enabled": enabled},
+        "controller": {
+            "design": "half-car",
+            "lambda": 1e10,
+            "T": 2.3,
+            "horizon": "finite",
+            "activation": "come-down",
+            "enabled": enabled,
+        },
     }
     record = {
         "format": 1,

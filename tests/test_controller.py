@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import subprocess
 import sys
-from dataclasses import asdict
+import zipfile
 from pathlib import Path
 from typing import Any
 
@@ -15,8 +15,8 @@ from conftest import ROOT
 from numpy.testing import assert_allclose
 from scipy.linalg import expm, solve_continuous_are
 
-from fmu_src.controller import design as designs
-from fmu_src.controller.design import Design, design, store, stored
+from fmu_src.controller.design import FILE_NAMES, Design, design, problem, store, stored
+from fmu_src.controller.fullcar import FullCar
 from fmu_src.controller.halfcar import HalfCar, half_car_state, strut_forces
 from fmu_src.controller.law import ControlParameters, control_law
 from fmu_src.controller.lqr_controller import LqrController
@@ -110,8 +110,7 @@ def test_gains_between_table_entries_are_right(
 
 
 def test_a_stored_design_is_read_back_bit_for_bit(default_design: Design, tmp_path: Path) -> None:
-    store(default_design, tmp_path)
-    assert stored(tmp_path) == default_design
+    assert stored(store(default_design, tmp_path)) == default_design
     assert default_design.serves(HalfCar(), "finite", 1e6)
     assert not design(HalfCar(), infinite=False, span=1.0).serves(HalfCar(), "finite", 1.1)
     assert not default_design.serves(HalfCar(lam=1e9), "infinite", 1.0)
@@ -160,17 +159,22 @@ def test_a_design_that_needs_missing_packages_says_what_to_install() -> None:
     assert "Install 'control'" in said
 
 
-def test_the_shipped_design_is_that_of_the_default_parameters(dist: Path, default_design: Design) -> None:
-    import zipfile
-
+@pytest.mark.parametrize("car", [HalfCar(), FullCar()])
+def test_the_shipped_designs_are_those_of_the_default_parameters(dist: Path, car: HalfCar | FullCar) -> None:
     with zipfile.ZipFile(dist / "LqrController.fmu") as archive:
-        shipped = json.loads(archive.read(f"resources/{designs.FILE_NAME}"))
-    assert shipped["car"] == asdict(HalfCar())
-    assert_allclose(shipped["infinite"], np.array(default_design.infinite), rtol=1e-9)
-    assert default_design.finite is not None
-    assert shipped["finite"]["settled"]
-    assert_allclose(shipped["finite"]["gains"], default_design.finite.gains, rtol=1e-9, atol=1e-6)
-    assert_allclose(shipped["finite"]["gains"][-1], shipped["infinite"], rtol=1e-9)
+        shipped = Design.of(json.loads(archive.read(f"resources/{FILE_NAMES[type(car)]}")))
+    assert shipped.car == car
+    assert shipped.finite is not None
+    assert shipped.serves(car, "finite", 1e6)
+    A, B, Q, R, K0 = problem(car)
+    forever = (K0 + infinite_horizon(A, B, Q, R)[1]).ravel()
+    assert shipped.infinite is not None
+    assert_allclose(shipped.infinite, forever, rtol=1e-9, atol=1e-9 * np.abs(forever).max())
+    s = np.linspace(0.0, 1.5, 16)
+    expected = [(K0 - np.linalg.solve(R, B.T @ L)).ravel() for L in finite_horizon(A, B, Q, R, s)]
+    got = [shipped.finite.gain(x) for x in s]
+    assert np.abs(np.array(got) - expected).max() < 3e-8 * np.abs(forever).max()
+    assert_allclose(shipped.finite.gain(1e6), forever, atol=3e-8 * np.abs(forever).max())
 
 
 @pytest.mark.parametrize("lam", [0.0, 1e6, 1e12, 1e14])
@@ -186,12 +190,16 @@ def test_the_gain_table_is_as_fine_as_the_control_is_fast(lam: float) -> None:
 
 
 def test_a_control_too_fast_for_any_table_is_refused_with_the_reason() -> None:
-    with pytest.raises(ParameterError, match=r"^lambda = 1e\+30 N2/m2: .* leaves the finite numbers"):
-        design(HalfCar(lam=1e30), infinite=False, span=10.0)
-    with pytest.raises(ParameterError, match=r"^c1 = 1e\+16 N/m: .* wanted a slower or shorter control"):
+    with pytest.raises(ParameterError, match=r"^lambda = 1e\+300 N2/m2: .* leaves the finite numbers"):
+        design(HalfCar(lam=1e300), infinite=False, span=10.0)
+    with pytest.raises(ParameterError, match=r"^c1 = 1e\+16 N/m: .* no stabilizing solution in double precision"):
         design(HalfCar(c1=1e16), infinite=False, span=2.0)
+    with pytest.raises(
+        ParameterError, match=r"^b1 = 0\.01 .*lambda = 1\.0 .*: the gain changes .*: wanted a shorter control, or"
+    ):
+        design(HalfCar(lam=1.0, b1=0.01, b2=0.01), infinite=False, span=1e9)
     undamped = HalfCar(lam=0.0, b1=0.0, b2=0.0)  # L = 0 for ever, but nothing says so
-    with pytest.raises(ParameterError, match=r"b1 = 0\.0 N\.s/m.*lambda = 0\.0 .* wanted a slower or shorter control"):
+    with pytest.raises(ParameterError, match=r"b1 = 0\.0 N\.s/m.*lambda = 0\.0 .* no stabilizing solution"):
         design(undamped, infinite=False, span=1e5)
     with pytest.raises(ParameterError, match=r"^b1 = 0\.0 .*lambda = 0\.0 .* imaginary axis"):
         design(undamped, infinite=True, span=None)

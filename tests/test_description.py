@@ -90,7 +90,8 @@ def test_outputs_depend_on_those_inputs_at_once_that_the_structure_says(
     """Every input is changed in turn in a state of no symmetry; parameters let everything through that can pass."""
     host = Host(Path(extract(dist / f"{model}.fmu", tmp_path)))
     if model == "LqrController":
-        assert host.set_string(host.reference["activation"], "at t_on") == OK
+        for name, text in (("activation", "at t_on"), ("design", "full-car")):
+            assert host.set_string(host.reference[name], text) == OK
     start = {"Vehicle7DOF": {"bp1": 100.0, "bp2": 90.0, "m11": 28.0}, "LqrController": {"t_on": 0.0}}
     assert host.start(**start.get(model, {})) == OK
     held = dict.fromkeys(host.inputs, 0.0)

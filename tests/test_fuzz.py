@@ -16,6 +16,7 @@ import build
 
 ANY = st.floats(allow_nan=True, allow_infinity=True) | st.sampled_from([0.0, 1e-3, 0.01, 1.0, 1e300, -1e300, 5e-324])
 STEPS = st.sampled_from([0.0, 1e-9, 1e-3, 1e-3, 1e-3, 0.01, 0.3, 5.0, 1e6, 1e300]) | ANY
+STRINGS = ["end", "start", "bump", "fourier", "infinite", "full-car", "semi-active", "estimate", "at t_on", "", "ψ"]
 TIMES = st.sampled_from([0.0, 1e-3, 0.25, 100.0, -5.0]) | ANY
 
 
@@ -64,7 +65,7 @@ class AnyCalls(RuleBasedStateMachine):
     def set_anything(self, references: list[int], data: st.DataObject) -> None:
         self.host.set_real(references, [data.draw(ANY) for _ in references])
 
-    @rule(reference=st.integers(0, 90), text=st.sampled_from(["end", "start", "bump", "fourier", "infinite", "", "ψ"]))
+    @rule(reference=st.integers(0, 90), text=st.sampled_from(STRINGS))
     def set_a_string(self, reference: int, text: str) -> None:
         self.host.set_string(reference, text)
 

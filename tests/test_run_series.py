@@ -59,11 +59,12 @@ def test_each_order_leaves_what_its_next_term_says(name: str, parameters: dict[s
 
 def test_a_motion_of_another_car_is_not_that_of_the_series() -> None:
     run = simulated(A=0.05)
-    vehicle = {**run.record["parameters"]["vehicle"], "Jx": run.reals("Jx")[0] * 1.001}
-    other = Run(
-        trajectory=run.trajectory,
-        record={**run.record, "parameters": {**run.record["parameters"], "vehicle": vehicle}},
-    )
+    Jx = run.reals("Jx")[0] * 1.001
+    parameters = {
+        component: {name: Jx if name == "Jx" else value for name, value in values.items()}
+        for component, values in run.record["parameters"].items()
+    }
+    other = Run(trajectory=run.trajectory, record={**run.record, "parameters": parameters})
     assert not any(finding.holds for finding in series_findings(other)[0])
 
 

@@ -91,7 +91,10 @@ def test_a_string_with_a_unit_is_read_in_si(tmp_path: Path, section: str, key: s
 
 
 def test_the_unit_that_a_message_suggests_is_accepted(tmp_path: Path) -> None:
-    written = "".join(f'"{q.name}" = "{q.start!r} {q.unit}"\n' for q in PARAMETERS.values())
+    written = "".join(
+        f'"{q.name}" = "{q.start!r} {q.unit}"\n' if q.unit != "1" else f"{q.name} = {q.start!r}\n"
+        for q in PARAMETERS.values()
+    )
     start = "".join(f'"{q.name}" = "0 {q.unit}"\n' for q in STATES)
     scenario = read(tmp_path, f"[parameters]\n{written}[start]\n{start}")
     assert scenario.parameters == {"road_sampling": "end", **{q.name: q.start for q in PARAMETERS.values()}}
@@ -102,6 +105,13 @@ def test_the_road_is_sampled_as_the_coupling_steps_it_and_the_other_way_is_refus
     assert read(tmp_path, '[simulation]\ncoupling = "jacobi"').parameters == {"road_sampling": "start"}
     ((line, said),) = faults(tmp_path, '[parameters]\nroad_sampling = "start"')
     assert (line, said) == (2, "road_sampling = 'start': coupling = 'gauss-seidel' wants 'end'")
+
+
+def test_control_shorter_than_a_step_is_refused(tmp_path: Path) -> None:
+    ((line, said),) = faults(tmp_path, "[simulation]\nstep = 0.01\n[parameters]\ntau0 = 0.0\nT = 0.305")
+    assert line == 5
+    assert said == "T = 0.305 s: wanted at least a step of 0.01 s of control, begun at 0.3 s"
+    assert read(tmp_path, "[simulation]\nstep = 0.01\n[parameters]\nT = 0.305\nenabled = false")
 
 
 # ------------------------------------------------------------------ a run.json is a scenario again

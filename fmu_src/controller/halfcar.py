@@ -83,6 +83,11 @@ class HalfCar:
         """Control weight of the cost, the unit matrix."""
         return [[1.0, 0.0], [0.0, 1.0]]
 
+    @property
+    def cost(self) -> tuple[Matrix, Matrix, Matrix]:
+        """Q, N (4 × 2), R of the cost ½ ∫ (xᵀQx + 2xᵀNu + uᵀRu) dt; nothing couples x and u."""
+        return self.Q, [[0.0, 0.0]] * 4, self.R
+
 
 def half_car_state(
     heave: float, pitch: float, heave_rate: float, pitch_rate: float

@@ -2,14 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from math import inf
+from operator import mul
+from typing import Any
 
 from ..quantities import PARAMETERS, Choice, refuse
-from .design import Design, Gain
+from ..vehicle.parameters import Car
+from .design import Design, Model
+from .fullcar import N_STATES, FullCar
 from .halfcar import HalfCar, half_car_state, strut_forces
+from .hardware import ACTUATORS, FEEDBACK, Forces, Hardware, Law
 
+DESIGN = Choice(
+    name="design",
+    values=("half-car", "full-car"),
+    text="the car that the gains are made for: in the plane, Eq. (4.1), or with seven degrees of freedom, a force for "
+    "each strut",
+)
 HORIZON = Choice(
     name="horizon",
     values=("finite", "infinite"),
@@ -22,14 +33,16 @@ ACTIVATION = Choice(
     "or at the time t_on",
 )
 SNAP = 1e-9  # s; a communication point this close below a switching time is that time
-Forces = tuple[float, float, float, float]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ControlParameters:
-    """What the controller is told; words in `quantities.PARAMETERS`. Raises ParameterError with every fault."""
+    """What the controller is told; words in `quantities.PARAMETERS`. Raises ParameterError with every fault.
 
-    car: HalfCar = field(default_factory=HalfCar)
+    model : the car that the gains are made for.  hardware : what stands between the law and the struts.
+    """
+
+    model: Model = field(default_factory=HalfCar)
     enabled: bool = True
     horizon: str = HORIZON.start
     activation: str = ACTIVATION.start
@@ -39,6 +52,7 @@ class ControlParameters:
     Lambda: float = PARAMETERS["Lambda"].start
     tau0: float = PARAMETERS["tau0"].start
     t_start: float = PARAMETERS["t_start"].start
+    hardware: Hardware = field(default_factory=Hardware)
 
     def __post_init__(self) -> None:
         faults = [PARAMETERS[f.name].fault(getattr(self, f.name)) for f in fields(self) if f.name in PARAMETERS]
@@ -53,7 +67,8 @@ class ControlParameters:
         """Time [s] from which the controller acts: t_B2 of §4 with the right side's delay, or t_on."""
         if self.activation == "at t_on":
             return self.t_on
-        rear = self.t_start + (self.car.a + self.car.b) / self.v0
+        car = self.model.car if isinstance(self.model, FullCar) else self.model
+        rear = self.t_start + (car.a + car.b) / self.v0
         return rear + max(self.tau0, 0.0) + 0.5 * self.Lambda / self.v0
 
     @property
@@ -62,10 +77,42 @@ class ControlParameters:
         return self.T if self.horizon == "finite" else inf
 
 
-def control_law(p: ControlParameters, made: Design | None) -> Callable[[float, Sequence[float]], Forces]:
+REALS = ("T", "t_on", "v0", "Lambda", "tau0", "t_start")
+HALF_CAR, CAR, WEIGHTS, HARDWARE = (  # names of the parameters, as the FMUs have them
+    tuple("lambda" if f.name == "lam" else f.name for f in fields(each) if f.name in PARAMETERS or f.name == "lam")
+    for each in (HalfCar, Car, FullCar, Hardware)
+)
+CHOICES = (HORIZON, ACTIVATION, DESIGN, ACTUATORS, FEEDBACK)
+
+
+def control_parameters(values: Mapping[str, Any]) -> ControlParameters:
+    """The control that these parameters describe, by the FMU's names; defaults where they are silent.
+
+    Raises ParameterError; the parts of a car that are not needed are not looked at.
+    """
+    refuse(choice.fault(values.get(choice.name, choice.start)) for choice in CHOICES)
+    chosen = {choice.name: values.get(choice.name, choice.start) for choice in CHOICES}
+
+    def among(names: Sequence[str]) -> dict[str, float]:
+        return {("lam" if n == "lambda" else n): float(values.get(n, PARAMETERS[n].start)) for n in names}
+
+    full = chosen["design"] == "full-car"
+    needs_car = full or chosen["actuators"] == "semi-active" or chosen["feedback"] == "estimate"
+    car = Car(**among(CAR)) if needs_car else Car()
+    return ControlParameters(
+        model=FullCar(car=car, **among(WEIGHTS)) if full else HalfCar(**among(HALF_CAR)),
+        enabled=bool(values.get("enabled", True)),
+        horizon=chosen["horizon"],
+        activation=chosen["activation"],
+        hardware=Hardware(car=car, actuators=chosen["actuators"], feedback=chosen["feedback"], **among(HARDWARE)),
+        **among(REALS),
+    )
+
+
+def control_law(p: ControlParameters, made: Design | None) -> Law:
     """Forces [N] of the struts fl, fr, rl, rr as a function of the time [s] and the car's 14 states.
 
-    `made` holds the gains that p asks for; None only if the controller is switched off.
+    `made` holds the gains that p asks for; None only if the controller is switched off. Ideal: without p.hardware.
     """
     off = (0.0, 0.0, 0.0, 0.0)
     if not p.enabled or made is None:
@@ -73,18 +120,29 @@ def control_law(p: ControlParameters, made: Design | None) -> Callable[[float, S
     begin, end = p.begin - SNAP, p.end - SNAP
     table, constant, T = made.finite, made.infinite, p.T
 
-    def gain(t: float) -> Gain:
+    def gain(t: float) -> Sequence[float]:
         if p.horizon == "finite":
             assert table is not None
             return table.gain(T - t)
         assert constant is not None
         return constant
 
-    def forces(t: float, x: Sequence[float]) -> Forces:
+    def half_car(t: float, x: Sequence[float]) -> Forces:
         if not begin <= t < end:
             return off
         k11, k12, k13, k14, k21, k22, k23, k24 = gain(t)
         z, phi, dz, dphi = half_car_state(x[0], x[2], x[7], x[9])
         return strut_forces((k11 * z + k12 * phi + k13 * dz + k14 * dphi, k21 * z + k22 * phi + k23 * dz + k24 * dphi))
 
-    return forces
+    def full_car(t: float, x: Sequence[float]) -> Forces:
+        if not begin <= t < end:
+            return off
+        K, n = gain(t), N_STATES
+        return (
+            sum(map(mul, K[:n], x)),
+            sum(map(mul, K[n : 2 * n], x)),
+            sum(map(mul, K[2 * n : 3 * n], x)),
+            sum(map(mul, K[3 * n :], x)),
+        )
+
+    return full_car if isinstance(p.model, FullCar) else half_car

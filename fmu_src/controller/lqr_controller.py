@@ -1,70 +1,98 @@
-"""LqrController: optimal stabilization of heave and pitch (§4) as a co-simulation component."""
+"""LqrController: optimal stabilization (§4) as a co-simulation component."""
 
 from __future__ import annotations
 
-from dataclasses import fields
 from pathlib import Path
 from typing import Any, ClassVar
 
 from ..quantities import FORCES, STATES, ParameterError
 from ..slave import Slave
-from .design import Design, design, stored
-from .halfcar import STATE_NAMES, HalfCar
-from .law import ACTIVATION, HORIZON, ControlParameters, control_law
+from .design import FILE_NAMES, Design, design, stored
+from .hardware import Loop, Memory
+from .law import CAR, CHOICES, HALF_CAR, HARDWARE, REALS, WEIGHTS, ControlParameters, control_law, control_parameters
 
-HALF_CAR = {"lambda" if f.name == "lam" else f.name: f.name for f in fields(HalfCar)}  # FMU's name -> field
+# The half car and its cost, times and road, the rest of the car, the other weights, hardware.
+PARAMETER_NAMES = tuple(dict.fromkeys([*HALF_CAR, *REALS, *CAR, *WEIGHTS, *HARDWARE]))
 
 
 class LqrController(Slave):
-    """u = K x at the present time, from heave and pitch and their rates; half of each axle's force to each strut."""
+    """u = K x at the present time: axle forces for heave and pitch, halved between the sides, or a force each strut."""
 
-    description = "Linear-quadratic optimal control of heave and pitch by actuators in the four struts"
+    description = "Linear-quadratic optimal control of the car by actuators in the four struts"
     inputs = STATES
     outputs = FORCES
-    reals = (*HALF_CAR, "T", "t_on", "v0", "Lambda", "tau0", "t_start")
-    choices = (HORIZON, ACTIVATION)
+    reals = PARAMETER_NAMES
+    choices = CHOICES
     switches: ClassVar[dict[str, str]] = {"enabled": "whether the controller acts; all forces are 0 if not"}
-    dependencies: ClassVar[dict[str, tuple[str, ...]]] = {q.name: STATE_NAMES for q in FORCES}
+    dependencies: ClassVar[dict[str, tuple[str, ...]]] = {q.name: tuple(x.name for x in STATES) for q in FORCES}
 
     _design: Design | None = None
+    _loop: Loop | None = None  # None: ideal actuators and full knowledge of the states
+    _before, _after = Memory(), Memory()  # the present look at the inputs
 
     def configure(self) -> None:
-        p = self.parameters()
-        car = HalfCar(**{field: p.pop(name) for name, field in HALF_CAR.items()})
-        (horizon, activation), (enabled,) = self.chosen, self.on
-        wanted = ControlParameters(car=car, enabled=enabled, horizon=horizon, activation=activation, **p)
+        choices = {choice.name: value for choice, value in zip(self.choices, self.chosen, strict=True)}
+        wanted = control_parameters({**self.parameters(), **choices, "enabled": self.on[0]})
         if wanted.enabled:
             self._design = self._designed(wanted)
         self._law = control_law(wanted, self._design)
+        self._loop = None
+        if wanted.enabled and not wanted.hardware.ideal:
+            try:
+                self._loop = Loop(wanted.hardware, self._law)
+            except ImportError as missing:
+                raise _lacking("feedback = 'estimate' needs a filter, whose computation", missing) from missing
 
     def _designed(self, p: ControlParameters) -> Design:
         """The design for these parameters: the one at hand, the one that was stored at build time, or a new one."""
         span = p.end - p.begin
-        for known in (self._design, stored(Path(self.resources)) if self.resources else None):
-            if known is not None and known.serves(p.car, p.horizon, span):
+        at_hand = stored(Path(self.resources) / FILE_NAMES[type(p.model)]) if self.resources else None
+        for known in (self._design, at_hand):
+            if known is not None and known.serves(p.model, p.horizon, span):
                 return known
         try:
-            return design(p.car, infinite=p.horizon == "infinite", span=span if p.horizon == "finite" else None)
+            return design(p.model, infinite=p.horizon == "infinite", span=span if p.horizon == "finite" else None)
         except ImportError as missing:
-            raise ParameterError(
-                [
-                    f"no design is stored for these parameters ({', '.join(HALF_CAR)}, horizon = {p.horizon}, "
-                    f"{span:g} s of control), and computing one needs a package that is not installed: {missing.name}. "
-                    "Install 'control' (it brings numpy and scipy) into the Python that runs this FMU, or keep the "
-                    "defaults"
-                ]
+            what = ", ".join(p.model.changes) or f"{span:g} s of control"
+            raise _lacking(
+                f"no design is stored for {what}, horizon = {p.horizon}, and computing one", missing
             ) from missing
 
+    def begin(self) -> None:
+        self._before = Memory()
+
     def memory(self) -> list[Any]:
-        return [self._design]
+        return [self._design, self._before, self._after]
 
     def recall(self, memory: list[Any]) -> None:
-        (design,) = memory
+        design, before, after = memory
         self._design = Design.of(design) if isinstance(design, dict) else design
+        self._before, self._after = _memory(before), _memory(after)
 
     def advance(self, t: float, step: float) -> None:
         self.time = t + step
+        if self._loop:
+            self._before = self._loop.elapsed(step, self._after)
         self.feed_through()
 
     def feed_through(self) -> None:
-        self.y[:] = self._law(self.time, self.u)
+        if self._loop:
+            self._after = self._loop.sampled(self.time, self.u, self._before)
+            self.y[:] = self._loop.forces(self.u, self._after)
+        else:
+            self.y[:] = self._law(self.time, self.u)
+
+
+def _memory(data: list[Any]) -> Memory:
+    """The memory from its plain data, through JSON or not."""
+    sample, time, command, reached, estimate = data
+    return Memory(sample, time, tuple(command), tuple(reached), tuple(estimate))
+
+
+def _lacking(what: str, missing: ImportError) -> ParameterError:
+    return ParameterError(
+        [
+            f"{what} needs a package that is not installed: {missing.name}. Install 'control' (it brings numpy and "
+            "scipy) into the Python that runs this FMU, or keep the defaults"
+        ]
+    )

@@ -5,6 +5,7 @@ numpy, scipy and control are imported inside the functions: an FMU that runs on 
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 from ..quantities import ParameterError
@@ -13,6 +14,9 @@ if TYPE_CHECKING:
     import numpy as np
 
     Array = np.ndarray[Any, Any]
+
+RESIDUAL = 1e-9  # of the algebraic equation, over its largest terms
+ROUND_OFF = 1e-12  # of poles, over the largest: closer to the imaginary axis they may lie on either side
 
 
 def riccati_rate(L: Array, A: Array, B: Array, Q: Array, R: Array) -> Array:
@@ -59,3 +63,50 @@ def infinite_horizon(A: Array, B: Array, Q: Array, R: Array) -> tuple[Array, Arr
 
     gain, L, _ = control.lqr(A, B, Q, R)
     return L, -gain
+
+
+def without_cross(A: Array, B: Array, Q: Array, R: Array, N: Array) -> tuple[Array, Array, Array]:
+    """(A', Q', K0): the cost xᵀQx + 2xᵀNu + uᵀRu is xᵀQ'x + vᵀRv of x' = A'x + B v, with u = v + K0 x."""
+    import numpy as np
+
+    K0 = -np.linalg.solve(R, N.T)
+    left = Q + N @ K0
+    return A + B @ K0, 0.5 * (left + left.T), K0
+
+
+def flow(A: Array, B: Array, Q: Array, R: Array) -> tuple[Callable[[Array, Array], Array], Array]:
+    """Solution of (4.7) in closed form, and the poles (n) of the closed loop with infinite horizon.
+
+    The function takes L (p, n, n) at some time to go and gives L (p, k, n, n) later by the times s (k) [s]. With the
+    stabilizing solution L∞ of the algebraic equation, its closed loop Ac and S = B R⁻¹ Bᵀ, Δ = L − L∞ obeys
+    Δ' = Δ Ac + Acᵀ Δ − Δ S Δ, hence
+
+        Δ(s) = Eᵀ Δ(0) [1 + W Δ(0)]⁻¹ E,  E = exp(Ac s),  W = ∫ E S Eᵀ ds = W∞ − E W∞ Eᵀ.
+
+    Raises ParameterError where there is no stabilizing solution in double precision.
+    """
+    import numpy as np
+    from scipy.linalg import expm, solve_continuous_are, solve_continuous_lyapunov
+
+    S, one = B @ np.linalg.solve(R, B.T), np.eye(len(A))
+    try:
+        last = solve_continuous_are(A, B, Q, R) if Q.any() else np.zeros_like(A)
+    except (np.linalg.LinAlgError, ValueError) as error:
+        raise ParameterError([f"the Riccati equation has no stabilizing solution: {error}"]) from error
+    closed = A - S @ last
+    poles = np.linalg.eigvals(closed)
+    stable = poles.real.max() < -ROUND_OFF * np.abs(poles).max()
+    size = np.abs(last @ A).max() + np.abs(last @ S @ last).max() + np.abs(Q).max()
+    if not (np.abs(riccati_rate(last, A, B, Q, R)).max() <= RESIDUAL * size and stable):
+        raise ParameterError(["the Riccati equation has no stabilizing solution in double precision"])
+    reach = solve_continuous_lyapunov(closed, -S)
+
+    def later(L: Array, s: Array) -> Array:
+        E = expm(closed * s[:, None, None])
+        W = reach - E @ reach @ E.transpose(0, 2, 1)
+        start = (L - last)[:, None]
+        whole = np.linalg.solve(one + W @ start, np.broadcast_to(E, (len(L), *E.shape)))
+        after = last + E.transpose(0, 2, 1) @ start @ whole
+        return 0.5 * (after + after.swapaxes(2, 3))
+
+    return later, poles

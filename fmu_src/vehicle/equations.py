@@ -14,11 +14,12 @@ these forces times the derivative of their points of attack by the coordinate. M
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from typing import Any
 
 from .parameters import Car
 
+Rates = Callable[..., tuple[Any, Any, Any, Any]]
 Motion = Callable[..., tuple[tuple[Any, ...], tuple[Any, ...], tuple[Any, ...]]]
 
 
@@ -84,3 +85,18 @@ def equations_of_motion(car: Car, sin: Callable[..., Any] = math.sin, cos: Calla
         return q_double_dot, (travel11, travel12, travel21, travel22), (N11, N12, N21, N22)
 
     return motion
+
+
+def strut_rates(car: Car, sin: Callable[..., Any] = math.sin, cos: Callable[..., Any] = math.cos) -> Rates:
+    """Function (q, v) -> Δ̇ (4) [m/s] of this car: rates of strut travel, as in `equations_of_motion`."""
+    a, b, s0, s1 = car.a, car.b, car.s0, car.s1
+
+    def rates(q: Iterable[Any], v: Iterable[Any]) -> tuple[Any, Any, Any, Any]:
+        _, psi, phi, _, _, _, psi2 = q
+        dz, dpsi, dphi, dz11, dz12, dz2, dpsi2 = v
+        dlift = cos(psi) * cos(phi) * dpsi - sin(psi) * sin(phi) * dphi
+        front, rear = dz - a * cos(phi) * dphi, dz + b * cos(phi) * dphi - dz2
+        roll = s0 * (dlift - cos(psi2) * dpsi2)
+        return front + s1 * dlift - dz11, front - s1 * dlift - dz12, rear + roll, rear - roll
+
+    return rates
