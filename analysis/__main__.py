@@ -195,16 +195,14 @@ def _simulate_counterpart(scenario: Scenario, run: Run, folder: Path) -> None:
 def _judge(run: Run, folder: Path) -> int:
     """Check, write findings.json, print a line for each; 0 if all hold, 1 if not."""
     from .check import check
-    from .run_averaging import why_not_averaged
+    from .run_averaging import averaged_findings
     from .run_series import series_findings
 
     findings = check(run)
-    of_series, why_no_series = series_findings(run)
-    findings += of_series
-    if why_no_series:
-        print(f"the series in the small parameter is not compared with the run: {why_no_series}", file=sys.stderr)
-    if reason := why_not_averaged(run):
-        print(f"averaging is not applied: {reason}", file=sys.stderr)
+    for name, (found, why_not) in (("averaging", averaged_findings(run)), ("series", series_findings(run))):
+        findings += found
+        if why_not:
+            print(f"{name}: not all is compared with the run: {why_not}", file=sys.stderr)
     text = json.dumps([f.as_json() for f in findings], indent=1, ensure_ascii=False) + "\n"
     write_whole(folder / FINDINGS, text.encode())
     for f in findings:

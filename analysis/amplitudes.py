@@ -35,7 +35,11 @@ class Stability:
 
 
 def stability(equations: AmplitudeEquations) -> Stability:
-    """The condition with its margins."""
+    """The condition with its margins.
+
+    Raises InputError where it does not decide: linear terms couple amplitudes, or a resonance forces one.
+    """
+    _only_own(equations)
     alpha, linear = equations.modes.alpha, equations.linear
     by_waves = _linear_by_waves(equations)
     growth, own = alpha + linear.real, equations.cubic.real
@@ -45,6 +49,19 @@ def stability(equations: AmplitudeEquations) -> Stability:
         critical_scale=np.array([_first_root([a, *row[1:]]) for a, row in zip(alpha, by_waves.real, strict=True)]),
         critical_amplitude=np.array([_amplitude(growth[k], own[k, k % half]) for k in range(len(growth))]),
     )
+
+
+def _only_own(equations: AmplitudeEquations) -> None:
+    """Raise InputError if s_k' has a constant, or s_j with another j."""
+    for part in equations.resonant:
+        for k, monomial, _ in part.entries():
+            free = [i for i in monomial if i < equations.n]
+            if len(free) < 2 and free != [k]:
+                term = f"s_{free[0] + 1}" if free else "a constant"
+                raise InputError(
+                    f"condition after (3.20): wanted s_{k + 1}' to have no linear term but s_{k + 1}, got {term}: "
+                    "modes of equal frequency (or that do not oscillate), or a road in resonance"
+                )
 
 
 def _linear_by_waves(equations: AmplitudeEquations) -> Complex:

@@ -22,6 +22,7 @@ from .signals import Piece
 from .standard_form import StandardForm
 
 ROUND_OFF = 1e-9  # of the largest frequency: combinations this small are zero
+LEAST = 1e-100  # m or rad: smaller amplitudes are integrated no more accurately, lest tolerances underflow
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -76,7 +77,7 @@ class AmplitudeEquations:
 
     def solve(self, s0: Complex, t: Array, *, rtol: float = 1e-10) -> Complex:
         """s (n, len(t)) at the times t (increasing) from s0 at t[0]."""
-        size = max(float(np.abs(s0).max()), 1e-300)
+        size = max(float(np.abs(s0).max()), LEAST)
         solution = solve_ivp(
             self.rate, (t[0], t[-1]), np.asarray(s0, complex), "DOP853", t, rtol=rtol, atol=rtol * 1e-2 * size
         )

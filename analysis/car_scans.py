@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
+import numpy as np
+
 from fmu_src.quantities import PARAMETERS
 
 from .car import car_form, road_signal
@@ -63,9 +65,10 @@ def variation(name: str) -> Variation:
 
 
 def lasting_road(parameters: Parameters) -> Piece | None:
-    """The road's waves once all wheels are on it; None if it is flat in the end (bump, step, flat)."""
+    """The road's waves once all wheels are on it; None if it is flat in the end (bump, step, waves of no height)."""
     road = road_parameters(parameters)
-    return road_signal(road).pieces[-1] if road.profile in ("sine", "fourier") else None
+    last = road_signal(road).pieces[-1]
+    return last if road.profile in ("sine", "fourier") and np.any(last.amplitudes) else None
 
 
 def system_of(parameters: Parameters, *, order: int = 3) -> tuple[StandardForm, Signal]:

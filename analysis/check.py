@@ -13,7 +13,6 @@ from .energy import balance
 from .errors import InputError
 from .findings import Finding
 from .reference import car_of, integrate, road_of
-from .run_averaging import averaged_findings
 from .trajectory import Array, Run
 
 # Largest deviation and energy residual of a run at H = 1 ms, rounded up, and their orders in H (tests measure them).
@@ -43,7 +42,6 @@ def check(run: Run) -> list[Finding]:
         _is_a_motion(x, expected, tolerance),
         _energy_balances(run),
         *discrepancy.findings(run, expected, forces, switches, tolerance),
-        *averaged_findings(run, tolerance),
     ]
 
 

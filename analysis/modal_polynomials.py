@@ -7,7 +7,6 @@ variables z = (u, E). There Φ is again a polynomial, and each of its monomials 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import combinations_with_replacement, permutations
 from typing import Any
@@ -107,25 +106,3 @@ def modal_parts(form: StandardForm, modes: Modes, w: Waves, power: int) -> list[
         monomials = all_monomials(T.shape[1], part.degree)
         found.append(Homogeneous(monomials, modes.K_inverse @ substituted(part, T, monomials)))
     return found
-
-
-def without_input(form: StandardForm) -> Mapping[int, tuple[Homogeneous, ...]]:
-    """The terms of Φ that the input does not enter: R of (3.10)."""
-    return _selected(form, entered=False)
-
-
-def with_input(form: StandardForm) -> Mapping[int, tuple[Homogeneous, ...]]:
-    """The terms of Φ that hold the input: the parametric excitation P of (3.10)."""
-    return _selected(form, entered=True)
-
-
-def _selected(form: StandardForm, *, entered: bool) -> dict[int, tuple[Homogeneous, ...]]:
-    n, chosen = len(form.A), {}
-    for power, terms in form.terms.items():
-        masks = [np.any(part.monomials >= n, axis=1) == entered for part in terms]
-        chosen[power] = tuple(
-            Homogeneous(part.monomials[mask], part.coefficients[:, mask])
-            for part, mask in zip(terms, masks, strict=True)
-            if mask.any()
-        )
-    return chosen

@@ -15,6 +15,7 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from .exponentials import Integers, distinct
 from .floquet import period_of
 from .modal_polynomials import Waves, all_monomials, exponents, modal_parts, waves
 from .modes import Complex, Modes, modes
@@ -22,7 +23,6 @@ from .polynomials import Array, Homogeneous
 from .signals import Piece
 from .standard_form import StandardForm
 
-Integers = NDArray[np.int64]
 SMALL = 0.01  # m or rad
 SILENT = 1e-12  # of the largest coefficient of Φ: terms as small as this do not occur
 
@@ -114,7 +114,7 @@ def resonances(
         monomials = all_monomials(len(m.K) + len(w.frequencies), degree)
         tables.append(parts.get(degree, Homogeneous(monomials, np.zeros((len(m.K), len(monomials))))))
     size = size or float(np.abs(w.forced).max(initial=0.0)) or SMALL
-    return _grouped(m, w, period_of(piece) if piece and columns.size else math.inf, tables, size)
+    return _grouped(m, w, period_of(piece) if piece and w.frequencies.any() else math.inf, tables, size)
 
 
 @dataclass(frozen=True, slots=True)
@@ -165,7 +165,7 @@ def _terms(
 
 def _unit_vectors(half: int, w: Waves, period: float) -> Integers:
     """Whole numbers (n + M, n/2 + 1) that say what each variable of (u, E) adds to n_1 … n_(n/2), ν."""
-    multiples = np.round(w.frequencies * period / (2.0 * np.pi)) if len(w.frequencies) else np.zeros(0)
+    multiples = np.round(w.frequencies / (2.0 * np.pi / period)) if np.isfinite(period) else 0.0 * w.frequencies
     unit = np.zeros((2 * half + len(multiples), half + 1), np.int64)
     unit[:half, :half], unit[half : 2 * half, :half] = np.eye(half), -np.eye(half)
     unit[2 * half :, half] = multiples
@@ -177,7 +177,7 @@ def _rows(terms: _Terms, frequencies: Array) -> tuple[Resonance, ...]:
     equalities = terms.equalities // np.gcd.reduce(terms.equalities, axis=1)[:, None]
     first = np.take_along_axis(equalities, np.argmax(equalities != 0, axis=1)[:, None], axis=1)
     possible = equalities.min(axis=1) * equalities.max(axis=1) < 0  # a sum of frequencies alone never vanishes
-    unique, group = _unique(equalities[possible] * np.sign(first[possible]))
+    unique, group = distinct(equalities[possible] * np.sign(first[possible]))
     distances, coefficients, gains = (v[possible] for v in (terms.distances, terms.coefficients, terms.gains))
     nearest, occurring = np.full((2, len(unique)), np.inf)
     largest, gain = np.zeros((2, len(unique)))
@@ -205,16 +205,6 @@ def _rows(terms: _Terms, frequencies: Array) -> tuple[Resonance, ...]:
     )
 
 
-def _unique(vectors: Integers) -> tuple[Integers, NDArray[np.intp]]:
-    """The different rows and to which each row belongs; by one number for each row, which is quicker than by rows."""
-    base = 2 * int(np.abs(vectors).max(initial=0)) + 1
-    if base ** vectors.shape[1] > np.iinfo(np.int64).max:
-        unique, group = np.unique(vectors, axis=0, return_inverse=True)
-        return unique, group
-    _, first, group = np.unique(vectors @ base ** np.arange(vectors.shape[1]), return_index=True, return_inverse=True)
-    return vectors[first], group
-
-
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Remark:
     """One line of remark 3.2 as printed: indices (R, 3 or 4) from 1, |λ_j + … − λ_m| [1/s], |β_j + … − β_m| [rad/s]."""
@@ -225,8 +215,11 @@ class Remark:
 
 
 def remark_as_printed(eigenvalues: Complex) -> tuple[Remark, Remark]:
-    """Both lines of remark 3.2 for λ (n,) in the paper's order: three and four modes, each with one minus sign."""
-    lam = eigenvalues[: len(eigenvalues) // 2]
+    """Both lines of remark 3.2 for λ (n,) in the paper's order: three and four modes, each with one minus sign.
+
+    Modes that do not oscillate, the last ones, are left out: with β = 0 the equalities hold of themselves.
+    """
+    lam = eigenvalues[eigenvalues.imag > 0.0]
     return _remark(lam, 2), _remark(lam, 3)
 
 

@@ -60,8 +60,13 @@ def table_of(parameters: Parameters) -> Resonances:
 
 
 def scan(parameters: Parameters, name: str, points: int) -> Scan:
-    """Half to twice the parameter's value, in even ratios. Raises InputError for an unknown parameter."""
+    """Half to twice the parameter's value, in even ratios.
+
+    Raises InputError for an unknown parameter, and for one that changes nothing.
+    """
     varied = variation(name)
+    if name == "speed" and lasting_road(parameters) is None:
+        raise InputError("--scan speed: wanted a road of lasting waves; elsewhere speed changes nothing")
     here = varied.value(parameters)
     values = here * np.geomspace(0.5, 2.0, points)
     changed = [varied.changed(parameters, value) for value in values.tolist()]
@@ -82,6 +87,8 @@ def _at(parameters: Parameters) -> tuple[Array, float, dict[Key, Resonance]]:
     form, piece = system_of(parameters)[0], lasting_road(parameters)
     found = modes(form.A)
     rows = resonances(form, piece, found=found).occurring
+    if not rows:
+        raise InputError("resonances: wanted two modes that oscillate at each point of the scan, got none; damp less")
     Omega = 2.0 * np.pi / period_of(piece) if piece else np.nan
     return found.beta[: len(found.beta) // 2], Omega, {(row.modes, row.road): row for row in rows}
 
@@ -90,11 +97,12 @@ def _at(parameters: Parameters) -> tuple[Array, float, dict[Key, Resonance]]:
 def command(scenario: str, scanned: str | None, out: Path | None) -> int:
     """The verb `resonances`; returns the exit status."""
     parameters = read_scenario(scenario).parameters
-    print("\n".join(lines(table_of(parameters), parameters)))
+    table = table_of(parameters)
+    print("\n".join(lines(table, parameters)))
     if scanned is None:
         if out:
             output_folder(out)
-            write_whole(out / "resonances.csv", as_csv(_rows(table_of(parameters).rows)))
+            write_whole(out / "resonances.csv", as_csv(_rows(table.rows)))
             print(f"{out / 'resonances.csv'}: written")
         return 0
     result = scan(parameters, scanned, POINTS)
@@ -135,6 +143,8 @@ def lines(table: Resonances, parameters: Parameters) -> list[str]:
         f"oscillate: {table.silent}.",
         "{:<24}{:>12}{:>10}{:>20}{:>10}{:>11}{:>15}".format(*heads),
     ]
+    if not occurring:
+        return text
     text += [_line(row) for row in occurring[:SHOWN]]
     nearest = min(occurring, key=lambda row: row.relative_distance)
     text.append(

@@ -11,6 +11,7 @@ from fmu_src.quantities import FORCES, STATES
 from .amplitudes import stability
 from .averaging import AmplitudeEquations, average
 from .car import car_form, road_signal
+from .check import own_error
 from .errors import InputError
 from .findings import Finding
 from .modes import Complex
@@ -22,7 +23,7 @@ from .standard_form import StandardForm
 from .trajectory import Run
 
 FEWEST = 10  # rows after the road's last edge
-REST = 1e-12  # m, rad, m/s, rad/s; smaller motions are rounding
+UNDAMPED = 1e-12  # of |λ|: decay rates as small as this are round-off
 LARGEST = 0.1  # of the motion, that averaging may leave out and still describe it
 
 
@@ -61,15 +62,13 @@ def stretch_of(run: Run) -> Stretch:
     if len(t) < FEWEST:
         raise InputError(f"the road changes its form until {signal.edges[-1]:g} s, and {len(t)} rows come after that")
     last = signal.pieces[-1]
-    if np.any(last.amplitudes[:, last.exponents == 0.0]):
-        raise InputError("the road stays at a height, around which averaging has no equations")
     piece, form = last if np.any(last.amplitudes) else None, car_form(car_of(run.parameters), order=3)
     equations = average(form, piece)
     x, m, w = run.trajectory.columns([q.name for q in STATES])[-len(t) :].T, equations.modes, equations.waves
     turned = (m.K_inverse @ x - w.forced @ w.at(t)) * np.exp(-1j * np.multiply.outer(m.beta, t))
-    if not np.abs(x).max() > REST:
-        raise InputError("the car rests")
     found = Stretch(t=t, x=x, amplitudes=turned, form=form, piece=piece, equations=equations)
+    if found.size == 0.0:
+        raise InputError("the car stands still")
     if not found.left_out <= LARGEST * found.size:
         raise InputError(
             f"the motion is too large: averaging would leave out up to {found.left_out / found.size:.2g} of it"
@@ -77,27 +76,25 @@ def stretch_of(run: Run) -> Stretch:
     return found
 
 
-def why_not_averaged(run: Run) -> str | None:
-    """Why `averaged_findings` has nothing to say about a run; None if it has."""
-    try:
-        stretch_of(run)
-    except InputError as error:
-        return str(error)
-    return None
-
-
-def averaged_findings(run: Run, accuracy: float) -> list[Finding]:
-    """Findings on a run of this accuracy (deviation of each state over its maximum); none where averaging fails."""
+def averaged_findings(run: Run) -> tuple[list[Finding], str]:
+    """Findings on a run that `check` takes: amplitudes, resonances, stability; if one is lacking, why."""
+    findings = []
     try:
         stretch = stretch_of(run)
-    except InputError:
-        return []
-    forced = [_condition(stretch)] if stretch.piece else []
-    return [_envelope(stretch, accuracy), *forced, _resonance(stretch)]
+        findings.append(_envelope(stretch, own_error(run)))
+        findings += _resonance(stretch)
+        if stretch.piece:
+            findings.append(_condition(stretch))
+    except InputError as error:
+        return findings, str(error)
+    return findings, ""
 
 
 def _envelope(stretch: Stretch, accuracy: float) -> Finding:
-    """|s_run − s_averaged| ≤ |W(t)| + |W(0)|, and what the run's own deviation makes in modal coordinates."""
+    """|s_run − s_averaged| ≤ |W(t)| + |W(0)|, and what the run's own deviation makes in modal coordinates.
+
+    accuracy : deviation of the run's states, each over its maximum.
+    """
     s, m = stretch.amplitudes, stretch.equations.modes
     averaged = stretch.equations.solve(s[:, 0], stretch.t)
     linear = s[:, :1] * np.exp(np.multiply.outer(m.alpha, stretch.t - stretch.t[0]))
@@ -115,12 +112,16 @@ def _envelope(stretch: Stretch, accuracy: float) -> Finding:
 
 
 def _condition(stretch: Stretch) -> Finding:
+    """Raises InputError where the condition does not decide."""
+    m = stretch.equations.modes
+    if np.any(np.abs(m.alpha) <= UNDAMPED * np.abs(m.eigenvalues)):
+        raise InputError("condition after (3.20): wanted damped modes, got one whose decay is round-off")
     found = stability(stretch.equations)
-    k = int(np.argmax(found.growth / np.abs(stretch.equations.modes.alpha)))
+    k = int(np.argmax(found.growth / np.abs(m.alpha)))
     return Finding(
         claim="the forced motion is stable by averaging: largest Re(α_k + ε(A_k + B_k)) over |α_k|",
         equation="condition after (3.20)",
-        measured=float(found.growth[k] / abs(stretch.equations.modes.alpha[k])),
+        measured=float(found.growth[k] / abs(m.alpha[k])),
         expected=-1.0,
         tolerance=1.0,
         unit="1",
@@ -129,11 +130,14 @@ def _condition(stretch: Stretch) -> Finding:
     )
 
 
-def _resonance(stretch: Stretch) -> Finding:
+def _resonance(stretch: Stretch) -> list[Finding]:
+    """None where no two modes oscillate (and no mode with the road)."""
     rows = resonances(stretch.form, stretch.piece, found=stretch.equations.modes).occurring
+    if not rows:
+        return []
     strongest = max(rows, key=lambda row: row.gain)
     damped = min(rows, key=lambda row: row.relative_distance)
-    return Finding(
+    finding = Finding(
         claim="modes and road are in no resonance: what the strongest combination adds to the motion, relative to it",
         equation="remark 3.2",
         measured=strongest.gain,
@@ -143,3 +147,4 @@ def _resonance(stretch: Stretch) -> Finding:
         source=f"run.json; strongest {strongest}; nearest in frequency {rows[0]}, {rows[0].detuning:.3g} rad/s; "
         f"nearest with damping {damped}, {damped.distance:.3g} 1/s",
     )
+    return [finding]

@@ -16,6 +16,7 @@ from fmu_src.vehicle.parameters import Car
 from .car import car_form
 from .car_scans import VARIATIONS, system_of, variation
 from .energy import kinetic_energy
+from .errors import InputError
 from .files import write_whole
 from .linear_response import linear_response
 from .nonlinear_response import nonlinear_response
@@ -46,11 +47,17 @@ def car_modes(car: Car) -> UndampedModes:
 
 
 def motions(parameters: Parameters, *, rtol: float = RTOL) -> tuple[Array, Array, Array]:
-    """Times (T,), and the passive car's linear and full motion (14, T) from rest on the road."""
+    """Times (T,), and the passive car's linear and full motion (14, T) from rest on the road.
+
+    Raises InputError if the road does not move the car within SPAN.
+    """
     form, signal = system_of(parameters, order=1)
     t = signal.begin + np.linspace(0.0, SPAN, SAMPLES)
     start = np.zeros(len(form.A))
-    return t, linear_response(form.A, form.B, start, signal, t), nonlinear_response(form, start, signal, t, rtol=rtol)
+    linear = linear_response(form.A, form.B, start, signal, t)
+    if not linear.any():
+        raise InputError(f"spatial: wanted a road that moves the car within {SPAN:g} s, got one that leaves it at rest")
+    return t, linear, nonlinear_response(form, start, signal, t, rtol=rtol)
 
 
 def transfer_of(parameters: Parameters) -> Transfer:

@@ -12,13 +12,16 @@ from scipy.optimize import brentq
 from scipy.special import ellipk
 
 from analysis.amplitudes import equilibria, stability, steady_states
+from analysis.audit import averaging as print_of
+from analysis.audit.modal import printed_amplitude
 from analysis.averaging import AmplitudeEquations, average
-from analysis.averaging_print import averaged_by_quadrature, compare, sine_series, unaveraged_growth
 from analysis.car import car_form, road_signal
 from analysis.errors import InputError
 from analysis.floquet import floquet, period_of, rate_and_slope
+from analysis.modal_polynomials import linear_map
+from analysis.modes import modal, modes
 from analysis.nonlinear_response import nonlinear_response
-from analysis.signals import Piece, harmonic
+from analysis.signals import Piece, Signal, harmonic
 from analysis.standard_form import StandardForm, standard_form
 from fmu_src.road.profiles import RoadParameters
 from fmu_src.vehicle.parameters import Car
@@ -59,11 +62,13 @@ def pair(eps: float, ratio: float, damping: float = 0.0) -> StandardForm:
     return standard_form(equations, ["x", "y", "x'", "y'"], 0)
 
 
-def sup_error(form: StandardForm, equations: AmplitudeEquations, x0: Sequence[float], end: float) -> float:
+def sup_error(
+    form: StandardForm, equations: AmplitudeEquations, x0: Sequence[float], end: float, w: Signal | None = None
+) -> float:
     """Of the averaged motion over [0, end] against a tight integration."""
     t = np.linspace(0.0, end, 400)
     s = equations.solve(equations.amplitudes(np.array(x0)), t, rtol=1e-11)
-    return float(np.abs(equations.states(s, t) - nonlinear_response(form, x0, None, t)).max())
+    return float(np.abs(equations.states(s, t) - nonlinear_response(form, x0, w, t)).max())
 
 
 def frequency(equations: AmplitudeEquations, r: float) -> complex:
@@ -103,6 +108,7 @@ def test_van_der_pols_limit_cycle() -> None:
     rest, cycle = equilibria(average(van_der_pol(0.01)))
     assert not rest.stable and rest.growth[0] == pytest.approx(0.005)
     assert cycle.stable and cycle.amplitudes[0] == pytest.approx(1.0, abs=1e-3)
+    np.testing.assert_allclose(stability(average(van_der_pol(0.01))).critical_amplitude, cycle.amplitudes[0], rtol=1e-9)
 
     def error(eps: float) -> float:
         equations = average(van_der_pol(eps), order=2)
@@ -148,6 +154,18 @@ def test_the_averaged_motion_is_right_to_order_eps_for_times_up_to_one_over_eps(
     def error(eps: float) -> float:
         form = form_of(eps)
         return sup_error(form, average(form, order=order, detuning=near * eps), x0, 1.0 / eps)
+
+    slope, bend = observed_order(error, EPSILONS)
+    assert slope == pytest.approx(order, abs=0.15)
+    assert bend < 0.1
+
+
+@pytest.mark.parametrize("order", [1, 2])
+def test_so_is_that_of_mathieus_equation_near_its_principal_resonance(order: int) -> None:
+    def error(eps: float) -> float:
+        form, drive = mathieu(eps), harmonic([1.0], 2.0 + eps)
+        equations = average(form, drive.pieces[0], order=order, detuning=6.0 * eps)
+        return sup_error(form, equations, [1.0, 0.5], 1.0 / eps, drive)
 
     slope, bend = observed_order(error, EPSILONS)
     assert slope == pytest.approx(order, abs=0.15)
@@ -244,6 +262,13 @@ def test_forced_duffing_against_harmonic_balance_of_a_third_party(primary: bool)
 
 
 # ---------------------------------------------------------------------------------------------------- the car
+def sines(amplitudes: Sequence[float], omega: float, column: int) -> Signal:
+    """w_column = Σ A_ν sin νωt, the car's other inputs 0."""
+    waves = [harmonic(-1j * a * np.eye(8)[column], nu * omega).pieces[0] for nu, a in enumerate(amplitudes, start=1)]
+    exponents = np.concatenate([wave.exponents for wave in waves])
+    return Signal((Piece(0.0, exponents, np.concatenate([wave.amplitudes for wave in waves], axis=1)),))
+
+
 def fourier_road(A: float, delay: float = 0.02) -> RoadParameters:
     """Two harmonics, all wheels, the right ones late."""
     return RoadParameters(profile="fourier", amplitudes=(A, 0.4 * A, *[0.0] * 6), Lambda=1.0, tau0=delay)
@@ -265,27 +290,38 @@ def test_the_cars_averaged_growth_rates_are_its_floquet_exponents() -> None:
         assert bend < 0.02
 
 
-@pytest.mark.parametrize("column", [0, 2], ids=["front left wheel", "rear left wheel"])
-def test_the_printed_averages_and_what_they_should_read(column: int) -> None:
-    """(3.17) is right; A_i, B_i and the sum are so only when corrected. Of a front wheel B is 0 in any reading."""
-    found = compare(car_form(Car(), order=3), (0.005, 0.002, 0.001), 2.0 * np.pi * 10.0 / 8.0, column)
-    assert all(corrected < 1e-13 for _, corrected in found.values())
-    assert found["(3.17)"][0] < 1e-13
-    assert found["sum over j of (3.20)"][0] == pytest.approx(1.0)  # twice the term of the mode itself
-    assert found["A_i of (3.20)"][0] == pytest.approx([0.104, 0, 0.941][column], abs=1e-3)
-    assert found["B_i of (3.20)"][0] == pytest.approx([0.0, 0, 1.0][column])
+@pytest.mark.parametrize(("column", "least"), [(0, 0.05), (2, 0.5)], ids=["front left wheel", "rear left wheel"])
+def test_the_cars_averages_are_the_corrected_3_20(column: int, least: float) -> None:
+    """One sine under one wheel: tensors of (3.14), P and ψ of (3.17), and the audit's formulas."""
+    form, size, omega = car_form(Car(), order=3), 0.005, 7.85
+    equations, m = average(form, sines((size,), omega, column).pieces[0]), modes(form.A)
+    cubic, parametric = modal(form.terms[1][0], m, 8)[:2]
+    P, psi = printed_amplitude(m.eigenvalues, size * m.input(form.B)[:, column], omega)
+    half = 0.02 * np.exp(1j * np.arange(7))
+    s = np.concatenate([half, half.conj()])
+    x = print_of.Textbook(m.beta, omega, cubic, P, psi, np.zeros((14, 14)), size * parametric[..., column], s)
+    A, B = print_of.A_corrected(x.alpha_bar, P, psi), print_of.B_corrected(x)
+    np.testing.assert_allclose(equations.linear, A + B, rtol=1e-9)
+    expected = s * (m.eigenvalues.real + A + B + print_of.pair_sum(x, halved=True))
+    np.testing.assert_allclose(equations.rate(0.0, s), expected, rtol=1e-9)
+    assert print_of.missed(A, print_of.A_printed(x.alpha_bar, P)) > least
+    assert (np.abs(B).max() > 0.0) == (column == 2)  # of a front wheel B is 0
 
 
-def test_averages_in_closed_form_are_what_quadrature_gives_and_the_print_lacks_one_over_t() -> None:
+def test_averages_in_closed_form_are_what_quadrature_gives() -> None:
+    """Two sines; (1/T) ∫ over 200 s of exp(−iβ_k t) Φ_k, s_k kept fixed, weighted by a bump, which speeds the limit."""
     form, rng = car_form(Car(), order=3), np.random.default_rng(3)
-    piece = sine_series((0.005, 0.002), 6.0, 2, 8)
+    equations = average(form, sines((0.005, 0.002), 6.0, 2).pieces[0])
+    m, w = equations.modes, equations.waves
     half = 0.02 * (rng.normal(size=7) + 1j * rng.normal(size=7))
     s = np.concatenate([half, half.conj()])
-    equations = average(form, piece)
-    expected = equations.rate(0.0, s) - equations.modes.alpha * s
-    found = averaged_by_quadrature(form, piece, s, 200.0, 32000)
+    part = (np.arange(32000) + 0.5) / 32000
+    t, weight = 200.0 * part, np.exp(-1.0 / (part * (1.0 - part)))
+    turns = np.exp(1j * np.multiply.outer(m.beta, t))
+    Phi = form.terms[1][0](linear_map(m, w) @ np.concatenate([s[:, None] * turns, w.at(t)]))
+    found = (np.conj(turns) * (m.K_inverse @ Phi)) @ (weight / weight.sum())
+    expected = equations.rate(0.0, s) - m.alpha * s
     np.testing.assert_allclose(found, expected, atol=1e-5 * np.abs(expected).max())
-    assert unaveraged_growth(form, piece, 100.0, 16000) == pytest.approx(2.0, rel=1e-3)
 
 
 def test_the_condition_and_the_road_at_which_it_fails() -> None:
@@ -298,6 +334,13 @@ def test_the_condition_and_the_road_at_which_it_fails() -> None:
     there = stability(average(form, scaled)).growth
     assert there[k] == pytest.approx(0.0, abs=1e-9)
     assert np.all(there[found.critical_scale > found.critical_scale[k] * (1.0 + 1e-9)] < 0.0)
+
+
+def test_the_condition_refuses_what_it_does_not_decide() -> None:
+    """Modes that do not oscillate have equal frequencies: their amplitudes are coupled by linear terms."""
+    piece = road_signal(fourier_road(0.01)).pieces[-1]
+    with pytest.raises(InputError, match="no linear term but"):
+        stability(average(car_form(Car(b1=12000.0, b2=12000.0), order=3), piece))
 
 
 def test_slopes_of_the_full_equations_are_exact() -> None:

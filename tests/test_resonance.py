@@ -19,6 +19,7 @@ from analysis.car import car_form, road_signal
 from analysis.car_scans import VARIATIONS, variation
 from analysis.errors import InputError
 from analysis.modes import modes
+from analysis.reference import Parameters
 from analysis.resonance import Resonance, Resonances, remark_as_printed, resonances
 from analysis.resonance_scan import scan
 from analysis.signals import harmonic
@@ -115,6 +116,8 @@ def test_modes_that_do_not_oscillate_take_no_part() -> None:
     overdamped = np.count_nonzero(modes(car_form(Car(b1=8000.0)).A).beta[:7] == 0.0)
     assert table.silent == overdamped > 0
     assert all(not any(r.modes[7 - overdamped :]) for r in table.rows)
+    three, four = remark_as_printed(modes(car_form(Car(b1=8000.0)).A).eigenvalues)
+    assert min(three.detuning.min(), four.detuning.min()) > 0.0
 
 
 def test_the_table_takes_milliseconds() -> None:
@@ -138,6 +141,22 @@ def test_a_variation_changes_what_it_says(name: str) -> None:
         assert float(changed["a"]) + float(changed["b"]) == pytest.approx(wheelbase)
     with pytest.raises(InputError, match="wanted one of speed, c2/c1, Jy, b/a"):
         variation("colour")
+
+
+def test_a_road_of_waves_without_height_has_none() -> None:
+    table = resonance_scan.table_of({"profile": "sine", "A": 0.0})
+    assert table.rows and all(r.road == 0 for r in table.rows)
+    with pytest.raises(InputError, match="speed changes nothing"):
+        scan({"profile": "sine", "A": 0.0}, "speed", points=2)
+
+
+def test_a_car_whose_modes_creep_has_an_empty_table() -> None:
+    creeping: Parameters = {"b1": 2e6, "b2": 2e6, "bp1": 2e6, "bp2": 2e6}
+    table = resonance_scan.table_of(creeping)
+    assert table.silent == 7 and not table.rows
+    assert "Modes that do not oscillate: 7" in "\n".join(resonance_scan.lines(table, creeping))
+    with pytest.raises(InputError, match="wanted two modes that oscillate"):
+        scan(creeping, "Jy", points=2)
 
 
 def test_a_scan_finds_the_speed_at_which_the_road_meets_a_mode() -> None:

@@ -11,7 +11,7 @@ from made_up_run import made_up_run
 from analysis.car import car_form, road_signal
 from analysis.nonlinear_response import nonlinear_response
 from analysis.reference import Parameters, car_of, road_parameters
-from analysis.run_averaging import averaged_findings, stretch_of, why_not_averaged
+from analysis.run_averaging import averaged_findings, stretch_of
 from analysis.trajectory import Run, Trajectory
 from fmu_src.quantities import FORCES, STATES
 
@@ -27,15 +27,15 @@ def run_of(parameters: Parameters, *, end: float = 1.5, driven: Parameters | Non
     x = nonlinear_response(car_form(car_of(truth), order=1), np.zeros(14), signal, t, rtol=1e-11).T
     names = tuple(q.name for q in (*STATES, *FORCES))
     trajectory = Trajectory(time=t, names=names, values=np.hstack([x, np.zeros((len(t), 4))]))
-    record = {**made_up_run().record, "parameters": {"all": parameters}}
+    record = {**made_up_run().record, "parameters": {"all": {"road_sampling": "end", **parameters}}}
     return Run(trajectory=trajectory, record=record)
 
 
 @pytest.mark.parametrize(("parameters", "count"), [(SINE, 3), (BUMP, 2)], ids=["sine", "bump, free decay"])
 def test_a_passive_run_follows_the_averaged_amplitudes(parameters: Parameters, count: int) -> None:
     run = run_of(parameters)
-    found = averaged_findings(run, 1e-9)
-    assert why_not_averaged(run) is None and len(found) == count
+    found, reason = averaged_findings(run)
+    assert not reason and len(found) == count
     assert all(f.holds for f in found)
     envelope = found[0]
     assert 0.0 < envelope.measured < envelope.tolerance < 5e-3
@@ -43,24 +43,41 @@ def test_a_passive_run_follows_the_averaged_amplitudes(parameters: Parameters, c
 
 
 def test_what_averaging_leaves_out_falls_with_the_square_of_the_road() -> None:
-    small = averaged_findings(run_of({**SINE, "A": 0.005}), 0.0)[0]
-    large = averaged_findings(run_of({**SINE, "A": 0.01}), 0.0)[0]
+    small, large = (averaged_findings(run_of({**SINE, "A": A}))[0][0] for A in (0.005, 0.01))
     assert large.measured / small.measured == pytest.approx(4.0, rel=0.05)
 
 
 def test_a_run_of_another_car_does_not_follow_them() -> None:
-    found = averaged_findings(run_of(SINE, driven={**SINE, "c2": 14300.0}), 1e-9)
+    found, _ = averaged_findings(run_of(SINE, driven={**SINE, "c2": 14300.0}))
     assert not found[0].holds
+
+
+def reason_of(run: Run, findings: int = 0) -> str:
+    """Why findings are lacking, all but so many."""
+    found, reason = averaged_findings(run)
+    assert len(found) == findings and all(finding.holds for finding in found)
+    return reason
 
 
 def test_where_averaging_does_not_apply_it_says_why() -> None:
     run = run_of(SINE, end=0.3)
-    assert averaged_findings(made_up_run(enabled=True), 1e-6) == []
-    assert "actuators act" in str(why_not_averaged(made_up_run(enabled=True)))
+    assert "actuators act" in reason_of(made_up_run(enabled=True))
     early = replace(run, trajectory=replace(run.trajectory, time=run.trajectory.time * 0.8))
-    assert "the road changes its form until 0.27 s, and 0 rows come after" in str(why_not_averaged(early))
+    assert "the road changes its form until 0.27 s, and 0 rows come after" in reason_of(early)
     huge = replace(run, trajectory=replace(run.trajectory, values=run.trajectory.values * 300.0))
-    assert "too large" in str(why_not_averaged(huge))
+    assert "too large" in reason_of(huge)
+    assert reason_of(run_of({**SINE, "profile": "flat"}, end=0.5)) == "the car stands still"
+
+
+@pytest.mark.parametrize(
+    ("damping", "why"), [(12000.0, "no linear term but"), (0.0, "wanted damped modes")], ids=["overdamped", "undamped"]
+)
+def test_what_can_be_said_of_a_car_without_the_condition_is_said(damping: float, why: str) -> None:
+    assert why in reason_of(run_of({**SINE, "A": 0.002, "b1": damping, "b2": damping}), findings=2)
+
+
+def test_a_step_is_a_road_without_waves() -> None:
+    assert not reason_of(run_of({**SINE, "profile": "step"}, end=0.6), findings=3)
 
 
 def test_the_amplitudes_of_a_steady_motion_are_none() -> None:

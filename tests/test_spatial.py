@@ -107,6 +107,11 @@ def test_the_grid_holds_the_scenario_itself_and_the_command_writes_it(
     assert len((tmp_path / "spatial.csv").read_text().splitlines()) == 4
 
 
+def test_a_flat_road_moves_nothing_and_says_so() -> None:
+    with pytest.raises(InputError, match="wanted a road that moves the car"):
+        transfer_of({"profile": "flat"})
+
+
 def test_modes_need_symmetric_matrices_and_mass() -> None:
     with pytest.raises(InputError, match="symmetric"):
         undamped_modes(np.eye(2), np.array([[1.0, 0.5], [0.0, 1.0]]))
