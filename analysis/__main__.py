@@ -88,6 +88,10 @@ def _parser() -> argparse.ArgumentParser:
     verb.add_argument("certificate", type=Path, metavar="CERT", help="certificate (JSON)")
     verb.set_defaults(do=_verify)
 
+    verb = verbs.add_parser("conditions", help="conditions 1 and 2 after (2.11), and the forms of them that can hold")
+    verb.add_argument("scenario", nargs="?", default="sine", help=f"{scenario} (default: sine)")
+    verb.set_defaults(do=_conditions)
+
     verb = verbs.add_parser(
         "resonances", help="how near the car's modes and road are to resonance, and what detunes them"
     )
@@ -262,6 +266,12 @@ def _verify(options: argparse.Namespace) -> int:
     from .certificate_command import judge_certificate
 
     return judge_certificate(options.certificate)
+
+
+def _conditions(options: argparse.Namespace) -> int:
+    from .car_conditions import command
+
+    return command(read_scenario(options.scenario).parameters)
 
 
 def _stabilize(options: argparse.Namespace) -> int:
