@@ -82,6 +82,8 @@ def _parser() -> argparse.ArgumentParser:
     verb.add_argument("-o", "--out", type=Path, metavar="CERT", help="certificate to write (JSON)")
     verb.add_argument("--quick", action="store_true", help="a coarse floor in a second, by scalar comparison")
     verb.add_argument("--largest", action="store_true", help="also search the largest amplitude that can be certified")
+    verb.add_argument("--closed-loop", action="store_true", help="under control for ever, and against no control")
+    verb.add_argument("--bounded", type=float, metavar="A", help="every road with |h| <= A [m] instead, around rest")
     verb.set_defaults(do=_certify)
 
     verb = verbs.add_parser("verify", help="prove a certificate's claims anew")
@@ -257,6 +259,14 @@ def _certify(options: argparse.Namespace) -> int:
     from .certificate_command import make_certificate, quick_answer
 
     scenario = read_scenario(options.scenario)
+    if options.bounded is not None:
+        from .car_bounded_roads import command
+
+        return command(scenario.parameters, options.bounded)
+    if options.closed_loop:
+        from .closed_loop_certificate import command as compare
+
+        return compare(scenario.parameters, options.out)
     if options.quick:
         return quick_answer(scenario.parameters)
     return make_certificate(scenario.parameters, options.out, largest=options.largest)
