@@ -82,11 +82,17 @@ def _parser() -> argparse.ArgumentParser:
     verb.add_argument("-o", "--out", type=Path, metavar="CERT", help="certificate to write (JSON)")
     verb.add_argument("--quick", action="store_true", help="a coarse floor in a second, by scalar comparison")
     verb.add_argument("--largest", action="store_true", help="also search the largest amplitude that can be certified")
+    verb.add_argument("--closed-loop", action="store_true", help="under control for ever, and against no control")
+    verb.add_argument("--bounded", type=float, metavar="A", help="every road with |h| <= A [m] instead, around rest")
     verb.set_defaults(do=_certify)
 
     verb = verbs.add_parser("verify", help="prove a certificate's claims anew")
     verb.add_argument("certificate", type=Path, metavar="CERT", help="certificate (JSON)")
     verb.set_defaults(do=_verify)
+
+    verb = verbs.add_parser("conditions", help="conditions 1 and 2 after (2.11), and the forms of them that can hold")
+    verb.add_argument("scenario", nargs="?", default="sine", help=f"{scenario} (default: sine)")
+    verb.set_defaults(do=_conditions)
 
     verb = verbs.add_parser(
         "resonances", help="how near the car's modes and road are to resonance, and what detunes them"
@@ -251,6 +257,14 @@ def _certify(options: argparse.Namespace) -> int:
     from .certificate_command import make_certificate, quick_answer
 
     scenario = read_scenario(options.scenario)
+    if options.bounded is not None:
+        from .car_bounded_roads import command
+
+        return command(scenario.parameters, options.bounded)
+    if options.closed_loop:
+        from .closed_loop_certificate import command as compare
+
+        return compare(scenario.parameters, options.out)
     if options.quick:
         return quick_answer(scenario.parameters)
     return make_certificate(scenario.parameters, options.out, largest=options.largest)
@@ -260,6 +274,12 @@ def _verify(options: argparse.Namespace) -> int:
     from .certificate_command import judge_certificate
 
     return judge_certificate(options.certificate)
+
+
+def _conditions(options: argparse.Namespace) -> int:
+    from .car_conditions import command
+
+    return command(read_scenario(options.scenario).parameters)
 
 
 def _stabilize(options: argparse.Namespace) -> int:

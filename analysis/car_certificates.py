@@ -13,7 +13,7 @@ from fmu_src.vehicle.parameters import Car
 
 from .bertolino_baksa.balls import ExactSystem, NotProvedError, precision
 from .bertolino_baksa.certificate import Certificate, certify
-from .bertolino_baksa.norms import modal_metric, proved_metric
+from .bertolino_baksa.norms import Norm, modal_metric, proved_metric
 from .bertolino_baksa.proof import Proof, prove
 from .bertolino_baksa.taylor import find_pieces
 from .car import car_form
@@ -50,13 +50,15 @@ def _checked(model: dict[str, Any]) -> tuple[Parameters, Array | None]:
     return parameters, gain
 
 
-def certify_car(parameters: Mapping[str, Any], gain: Array | None = None) -> tuple[Certificate, Proof]:
-    """The certificate of x_lin from rest for these parameters of car and road.
+def certify_car(
+    parameters: Mapping[str, Any], gain: Array | None = None, named: tuple[Norm, ...] = ()
+) -> tuple[Certificate, Proof]:
+    """The certificate of x_lin from rest for these parameters of car and road, in the norms `named` or in its own.
 
     Raises NotProvedError, with the reason, if there is none; InputError for parameters that cannot be.
     """
     model, car, S, ends = _prepared(parameters, gain)
-    return certify(model, build, S, lambda x_lin: norms(car, x_lin), ends, np.zeros(14))
+    return certify(model, build, S, lambda x_lin: named or norms(car, x_lin), ends, np.zeros(14))
 
 
 def prove_reference(parameters: Mapping[str, Any], gain: Array | None = None) -> Proof:

@@ -10,10 +10,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from flint import arb
+from flint import arb, arb_mat
 from scipy.linalg import expm
 
-from .balls import Array, ExactSystem, above, matrix, rounded, two_norm
+from .balls import Array, ExactSystem, above, magnitudes, matrix, rounded, two_norm
 from .norms import Metric, Norm
 from .tube import Outputs, Piece, Tube, enclosed_series
 
@@ -55,6 +55,20 @@ class Decay:
         last = np.sqrt(((metric.S @ self.ends[-1] @ inverse) ** 2).sum())
         root = np.sqrt(len(norm.T)) if norm.largest else 1.0
         return float(last * root * (1 + EPS) + self._rounding(metric.S, inverse, rest))
+
+    def integral(self, metric: Metric, left: Array, right: arb_mat) -> Array:
+        """Γ (p, q) ≥ ∫_0^∞ |left e^(At) right| dt, entry by entry; left (p, n) exact, right (n, q).
+
+        On a cell by the trapezium of its ends, as |chord| is convex; what comes after the last cell by ‖·‖_S.
+        """
+        centre, rest = rounded(right)
+        sizes, bend = np.abs(left @ self.ends @ centre), np.abs(left) @ self.curve @ np.abs(centre)
+        whole = (((sizes[:-1] + sizes[1:]) / 2 + bend) * self.width[:, None, None]).sum(axis=0)
+        off = self._rounding(left, centre, rest) * self.width.sum()
+        start = np.sqrt(((metric.S @ self.ends[-1] @ centre) ** 2).sum(axis=0)) * (1 + EPS)
+        start += self._rounding(metric.S, centre, rest)
+        reach = np.sqrt((magnitudes(matrix(left) * metric.inverse) ** 2).sum(axis=1))
+        return np.asarray((whole + off + np.outer(reach, start) / metric.alpha) * (1 + 10 * EPS))
 
     def _rounding(self, left: Array, inverse: Array, rest: float) -> float:
         """What rounding and enclosures add, at most, to any norm of left · e^(At) · inverse, with much to spare."""

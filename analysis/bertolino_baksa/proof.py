@@ -31,6 +31,13 @@ class Repetition:
     window: Tube
     X: Array  # bounds (N, n + m) of (x, w) over its cells
 
+    @property
+    def multiplier(self) -> tuple[float, float]:
+        """m ≥ ‖x(t + T) − y(t + T)‖_S / ‖x(t) − y(t)‖_S of motions in the tube, at t of its begin, and T [s]."""
+        pieces = self.window.pieces
+        logarithm = sum((arb(g) * arb(p.duration) for g, p in zip(self.window.growth, pieces, strict=True)), arb(0))
+        return above(logarithm.exp()), float(pieces[-1].end - pieces[0].begin)
+
 
 @dataclass(frozen=True, slots=True)
 class Proof:

@@ -1,0 +1,76 @@
+"""`python -m analysis certify SCENARIO --closed-loop`: the certificate under constant feedback, beside the passive one.
+
+The controller of the half car with the gain of its infinite horizon acts for all t ≥ 0 and at every instant, so that
+the car is x' = F(x, w) with u = K x: A − B_u K in the standard form. Both certificates use the passive car's norms.
+"""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import numpy as np
+
+from fmu_src.controller.design import design
+
+from .bertolino_baksa.balls import NotProvedError
+from .bertolino_baksa.certificate import Certificate, Claim, to_json
+from .bertolino_baksa.proof import Proof
+from .car_certificates import certify_car
+from .certificate_command import statement
+from .files import write_whole
+from .polynomials import Array
+from .reference import Parameters, control_of
+from .stabilization.full_car import strut_gain
+
+SHARES = (0.01, 0.1, 0.5)  # of the smaller largest ε, at which δ is compared
+
+
+def infinite_gain(parameters: Parameters) -> Array:
+    """Gain (4, 14) of u = −gain x at the struts, by the controller of these parameters on its infinite horizon."""
+    made = design(control_of(parameters).car, infinite=True, span=None)
+    return -strut_gain(np.array(made.infinite).reshape(2, 4))
+
+
+def both(parameters: Parameters) -> tuple[tuple[Certificate, Proof], tuple[Certificate, Proof]]:
+    """The passive certificate and the one under control, in the same norms. Raises NotProvedError if one is none."""
+    passive = certify_car(parameters)
+    named = tuple(claim.norm for claim in passive[0].claims)
+    return passive, certify_car(parameters, infinite_gain(parameters), named)
+
+
+def command(parameters: Parameters, where: Path | None) -> int:
+    """Print both and what control changes, write the certificate under control; 0, or 1 if one is not proved."""
+    print("Finding and proving a reference motion without and with control ...", file=sys.stderr, flush=True)
+    try:
+        passive, closed = both(parameters)
+    except NotProvedError as error:
+        print(f"no certificate: {error}")
+        return 1
+    for title, made in (("without control", passive), ("with control for all t >= 0", closed)):
+        print("\n".join([f"{title}:", *statement(*made)]))
+    print("\n".join(["what control changes, each norm the same for both:", *comparison(passive[0], closed[0])]))
+    if where is not None:
+        write_whole(where, to_json(closed[0]))
+        print(f"{where}: written")
+    return 0
+
+
+def comparison(passive: Certificate, closed: Certificate) -> list[str]:
+    """l, the largest δ, and δ at the same ε of both, norm by norm; between rows of the tables by interpolation."""
+    lines = []
+    for before, after in zip(passive.claims, closed.claims, strict=True):
+        top = min(before.table[-1, 0], after.table[-1, 0])
+        wider = ", ".join(
+            f"{_delta(after, e) / _delta(before, e):.3g} at eps = {e:.3g}" for e in (s * top for s in SHARES)
+        )
+        lines.append(
+            f"  {before.norm.name} norm: l times {after.floor / before.floor:.4g}; largest delta times "
+            f"{after.largest_delta / before.largest_delta:.3g}; delta times {wider}"
+        )
+    return lines
+
+
+def _delta(claim: Claim, epsilon: float) -> float:
+    """δ at ε, with (log ε, log δ) on chords between the rows of the table."""
+    return float(np.exp(np.interp(np.log(epsilon), *np.log(claim.table.T))))

@@ -1,0 +1,49 @@
+"""The certificate under constant feedback: its gain is the controller's, it is proved anew, and no start escapes."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from analysis.bertolino_baksa.adversary import excursions
+from analysis.bertolino_baksa.balls import NotProvedError
+from analysis.bertolino_baksa.certificate import from_json, to_json, verify
+from analysis.car import car_form, road_signal
+from analysis.car_certificates import build
+from analysis.closed_loop_certificate import both, comparison, infinite_gain
+from analysis.reference import control_of, road_parameters
+from analysis.scenario import read_scenario
+from fmu_src.controller.design import design
+from fmu_src.controller.law import control_law
+from fmu_src.vehicle.parameters import Car
+
+
+def test_the_gain_is_what_the_controller_does() -> None:
+    control = dataclasses.replace(control_of({}), horizon="infinite", activation="at t_on", t_on=0.0)
+    law = control_law(control, design(control.car, infinite=True, span=None))
+    x = np.random.default_rng(1).normal(size=14)
+    np.testing.assert_allclose(-infinite_gain({}) @ x, law(1.0, x.tolist()), rtol=1e-12)
+
+
+def test_control_is_certified_in_the_passive_norms() -> None:
+    parameters = dict(read_scenario("bump-lqr").parameters)
+    (passive, _), (closed, _) = both(parameters)
+    read = from_json(to_json(closed), "here")
+    verify(read, build)
+    stiffer = (1.1 * infinite_gain(parameters)).tolist()
+    with pytest.raises(NotProvedError):
+        verify(dataclasses.replace(read, model={**read.model, "gain": stiffer}), build)
+    form, signal = car_form(Car(), gain=infinite_gain(parameters)), road_signal(road_parameters(parameters))
+    rng = np.random.default_rng(4)
+    for before, claim in zip(passive.claims, closed.claims, strict=True):
+        assert np.array_equal(before.norm.T, claim.norm.T)
+        assert 0.9 < claim.floor / before.floor < 1.0  # it acts late on what the axle does within 0.1 s
+        epsilon, delta = claim.table[-1].tolist()
+        off = rng.normal(size=(14, 20))
+        off *= delta / claim.norm(off)
+        assert excursions(form, signal, [claim.norm], np.zeros(14), off, 1.0, 1e-3).max() < epsilon
+    energy = closed.claims[0]
+    assert energy.largest_delta > 1.2 * passive.claims[0].largest_delta
+    assert len(comparison(passive, closed)) == 3

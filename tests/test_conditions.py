@@ -1,0 +1,98 @@
+"""Conditions 1 and 2 after (2.11) and their forms C0 to C3, on textbook systems and on the car.
+
+That C1 agrees with exact Floquet exponents to the order A⁴ is tested in test_averaging.py.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import pytest
+from flint import fmpq
+from test_almost_stable import OMEGA, PERIOD, build, certified, duffing, quiet
+
+from analysis.bertolino_baksa.conditions import Verdict, conditions, growth_of
+from analysis.bertolino_baksa.norms import proved_metric
+from analysis.bertolino_baksa.proof import Proof, prove
+from analysis.car import car_form
+from analysis.car_conditions import car_verdicts
+from analysis.floquet import floquet
+from analysis.modes import modes
+from analysis.scenario import read_scenario
+from analysis.signals import Piece, harmonic
+from analysis.standard_form import standard_form
+from fmu_src.vehicle.parameters import Car
+
+
+def wave(height: float) -> Piece:
+    return harmonic([height], OMEGA).pieces[-1]
+
+
+def verdicts(equations: Any, piece: Piece | None) -> tuple[Verdict, ...]:
+    """Of a system that no motion is proved of but rest."""
+    form = standard_form(equations, ["x", "v"], 1)
+
+    def at_rest() -> Proof:
+        system = build(equations, 2, quiet, fmpq(0))({})
+        return prove(system, proved_metric(system, np.eye(2)), [], [0.0, 0.0])
+
+    return conditions(form, piece, at_rest)
+
+
+def test_duffing_without_force_has_no_average_at_all() -> None:
+    """λ = −1/2 ± iβ: each of its 8 monomials dies, slowest v v v* in v' as exp(−t); so S_1 = 0 and v = 0 is neutral."""
+    _, proof, form, _ = certified(duffing, 2)
+    C0, C1, C2, C3 = conditions(form, None, lambda: proof)
+    growth = growth_of(form)
+    assert (growth.growing, growth.dying, growth.lasting) == (0, 8, 0)
+    assert not C0.holds and "neutral" in C0.reason
+    assert C1.holds and C1.number == pytest.approx(-0.5)
+    assert C2.holds and C2.number == pytest.approx(1.0)
+    assert C3.holds and C3.number < 1e-6
+
+
+def test_forced_duffing_contracts_and_the_print_cannot_say_so() -> None:
+    """E E E in v' grows as exp(t/2), to the print's S_1 = ∞; the proved multiplier is just above the exact one."""
+    _, proof, form, _ = certified(duffing, 2, forced=True)
+    C0, C1, C2, C3 = conditions(form, wave(0.3), lambda: proof)
+    assert not C0.holds and C0.number == pytest.approx(0.5)
+    assert C1.holds and C2.holds and C3.holds
+    exact = np.exp(floquet(form, wave(0.3)).exponents.real.max() * float(PERIOD))
+    assert exact < C3.number < 1.05 * exact
+
+
+def test_van_der_pols_origin_is_unstable_in_every_form() -> None:
+    C0, C1, C2, C3 = verdicts(lambda z, w, s, c: [z[1], -z[0] + z[1] * 0.2 - z[0] * z[0] * z[1] * 0.2 + w[0]], None)
+    assert not (C0.holds or C1.holds or C2.holds or C3.holds)
+    assert C1.number == pytest.approx(0.1)
+    assert "does not contract" in C3.reason
+
+
+def test_the_print_holds_where_only_the_input_damps() -> None:
+    """x'' + w² x' + x = 0, w = cos Ωt: S_1(v) = −v/4, w bounded. C3 asks for damping without input: not proved."""
+
+    def equations(z: Sequence[Any], w: Sequence[Any], s: Any, c: Any) -> list[Any]:
+        return [z[1], -z[0] - w[0] * w[0] * z[1]]
+
+    C0, C1, C2, C3 = verdicts(equations, wave(1.0))
+    assert C0.holds and C1.holds and C2.holds and not C3.holds
+    assert C0.number == pytest.approx(-0.25)
+    assert C2.number == pytest.approx(2.0)  # E E* v in v*'; (E*)² v there has 2Ω − 2, more than that
+
+
+def test_on_the_car_the_print_never_holds() -> None:
+    """All monomials of the slowest mode die out, whatever the constants; those of fast modes grow."""
+    form = car_form(Car(), order=3)
+    growth, alpha = growth_of(form), modes(form.A).alpha
+    slowest = growth.sigma.real[np.array(growth.equation) == np.argmax(alpha)]
+    assert len(slowest) and (slowest < 0.0).all()
+    assert growth.growing > 100
+    assert growth.fastest == pytest.approx(3.0 * alpha.max() - alpha.min())
+
+
+def test_the_verdict_of_record_on_the_bump() -> None:
+    C0, C1, C2, C3 = car_verdicts(read_scenario("bump").parameters)
+    assert not C0.holds
+    assert C1.holds and C2.holds and C3.holds
