@@ -1,0 +1,106 @@
+"""Proofs about an exported run: which rows are of no motion of its car on its road, and the motion between the rows."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from fmu_src.quantities import FORCES, STATES
+
+from .bertolino_baksa.balls import NotProvedError
+from .car_certificates import metric_of
+from .check import own_error
+from .discrepancy import scales
+from .errors import InputError
+from .exact_car import energy_norm, exact_system
+from .exported import read_export
+from .falsification import Motions, Rows, compare, motions
+from .findings import Finding
+from .polynomials import Array
+from .reference import car_of, road_parameters
+from .scenario import read_scenario
+from .trajectory import Run
+
+DEFAULT = "bump"  # scenario of an export without one: the default car on the paper's bump
+LONGEST = 10.0  # s from the first row that are judged
+
+
+def certified_findings(
+    run: Run, rounding: Array | None = None, file: str = "trajectory.csv"
+) -> tuple[list[Finding], str]:
+    """Findings on a passive run on a profile of ours; if there are none, why.
+
+    rounding : of the printed digits of the states (N, 14); by default that of doubles.
+    """
+    u = [q.name for q in FORCES if q.name in run.trajectory.names]
+    if u and np.any(run.trajectory.columns(u)):
+        return [], "the actuators act, and the proof is of the car without them"
+    if len(run.trajectory.time) < 2:
+        return [], "a single row is no motion"
+    t = run.trajectory.time
+    t = t[t <= t[0] + LONGEST]
+    x = run.trajectory.columns([q.name for q in STATES])[: len(t)]
+    digits = np.spacing(np.abs(x)) if rounding is None else rounding[: len(t)]
+    try:
+        found = _motions(run, t, x[0], digits[0])
+    except NotProvedError as error:
+        return [], str(error)
+    own = own_error(run)
+    rows = compare(found, t, x, lambda expected: own * scales(expected), digits)
+    return [_of_rows(rows, own, t, file), _between_rows(run, found, rows)], ""
+
+
+def judge_export(path: Path, road_class: str | None, scenario: str | None) -> int:
+    """Print what can be said of a CSV that another tool wrote; 0 if all holds, 1 if not or if nothing can be said.
+
+    Raises InputError for another class of roads than 'exact', and for what is no export.
+    """
+    if road_class != "exact":
+        raise InputError(
+            f"--road-class {road_class}: wanted 'exact'; the file alone says nothing of the road between its rows"
+        )
+    run, rounding = read_export(path, read_scenario(scenario or DEFAULT))
+    findings, reason = certified_findings(run, rounding, str(path))
+    if reason:
+        print(f"nothing is proved: {reason}")
+    for finding in findings:
+        print(finding.line)
+    return 0 if findings and all(finding.holds for finding in findings) else 1
+
+
+def _motions(run: Run, t: Array, x0: Array, rounding: Array) -> Motions:
+    car = car_of(run.parameters)
+    system = exact_system(car, road_parameters(run.parameters))
+    return motions(system, metric_of(car), x0, rounding, float(t[0]), float(t[-1]))
+
+
+def _of_rows(rows: Rows, own: float, t: Array, file: str) -> Finding:
+    first = "" if rows.first is None else f"; the first row out: {rows.first + 2}"
+    return Finding(
+        claim=f"no row is proved to be of another motion: distance from the proved tube of the motion from the first "
+        f"row, over what integrator ({own:.0e} of a state's maximum), printed digits and proof allow, to {t[-1]:g} s",
+        equation="(3.1)–(3.7)",
+        measured=rows.ratio,
+        expected=0.0,
+        tolerance=1.0,
+        unit="1",
+        source=f"{file}, row {rows.row + 2}, column {STATES[rows.state].name}, largest{first}",
+    )
+
+
+def _between_rows(run: Run, found: Motions, rows: Rows) -> Finding:
+    """The bound is of the exact motion from the first row; the run's own error comes on top of it at its rows."""
+    norm = energy_norm(car_of(run.parameters))
+    bound, seen = found.largest_error(norm), float(norm(rows.e.T).max())
+    own = float(np.linalg.norm(np.abs(norm.T) @ rows.allowed.max(axis=0)))
+    return Finding(
+        claim="the run stays as near x_lin as is proved of the motion from its first row at all times, between the "
+        "rows too: largest N(x - x_lin) at a row, N the energy norm",
+        equation="(2.3), definition 2.1",
+        measured=float(norm((rows.off + rows.e).T).max()),
+        expected=0.0,
+        tolerance=bound + own,
+        unit="J^0.5",
+        source=f"run.json; proved for all t: {bound:.6g}, of which the motion reaches {seen:.6g} at the rows",
+    )
