@@ -21,8 +21,8 @@ GAP = 1.5  # times the median step; more between two rows is a gap
 _NAME = re.compile(r"\s*(?:(?:vehicle|road|controller)\.)?(.*?)\s*(?:\[(.*)\])?\s*")
 
 
-def read_export(path: Path, scenario: Scenario) -> tuple[Run, Array]:
-    """The run of the scenario's car and road in this file, and what the digits of its states (N, 14) leave open.
+def read_export(path: Path, scenario: Scenario) -> tuple[Run, dict[str, Array]]:
+    """The run of the scenario's car and road in this file, and what its columns' digits leave open.
 
     Raises InputError naming row and column of what cannot be one: gaps, times that do not rise, what is no number,
     columns that are missing or in another unit.
@@ -37,8 +37,8 @@ def read_export(path: Path, scenario: Scenario) -> tuple[Run, Array]:
         raise InputError(f"{path}: row 1: wanted all 14 states, but {', '.join(missing)} are missing")
     trajectory = parsed(chain([names], rows[1:]), path)
     _refuse_gaps(trajectory, path)
-    where = [names.index(q.name) for q in STATES]
-    rounding = np.stack([_rounding([row[i] for row in rows[1:]]) for i in where], axis=1)
+    known = [(i, name) for i, name in enumerate(names) if name in TABLE]
+    rounding = {name: _rounding([row[i] for row in rows[1:]]) for i, name in known}
     parameters = {"scenario": scenario.parameters}
     record = {"scenario": scenario.as_json(), "parameters": parameters, "fmus": {}}
     return Run(trajectory=trajectory, record=record), rounding

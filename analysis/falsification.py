@@ -25,6 +25,7 @@ from .bertolino_baksa.tube import Tube, prove_tube
 class Motions:
     """The tube of all motions x and x_lin whose start is within the rounding of a first row, at times from it on."""
 
+    system: ExactSystem  # its time counted from the first row
     tube: Tube
     metric: Metric
     begin: fmpq  # [s], time of the first row
@@ -62,7 +63,7 @@ def motions(system: ExactSystem, S: Array, x0: Array, rounding: Array, begin: fl
         off = metric.longest(rounding)
         pieces = find_pieces(later, x0.tolist(), last - start)
         tube = prove_tube(later, metric, pieces, (x0, np.zeros(later.n)), (off, off))
-    return Motions(tube, metric, start)
+    return Motions(later, tube, metric, start)
 
 
 def since(system: ExactSystem, begin: fmpq) -> ExactSystem:

@@ -13,17 +13,21 @@ import pytest
 
 from analysis.__main__ import main
 from analysis.bertolino_baksa.balls import NotProvedError
+from analysis.car import car_form, road_signal
 from analysis.cosimulation import simulate
+from analysis.errors import InputError
 from analysis.exact_car import energy_norm
 from analysis.exported import _rounding
+from analysis.reference import road_parameters
 from analysis.run_certificates import _motions, certified_findings
 from analysis.scenario import built_in_scenarios, read_scenario
 from analysis.trajectory import Run, write_csv
-from fmu_src.quantities import STATES
+from analysis.unknown_roads import AllRoads, FittedRoad, fitted_road, on_all_roads, road_class
+from fmu_src.quantities import ROAD_HEIGHTS, STATES
 from fmu_src.vehicle.parameters import Car
 
 NAMES = [q.name for q in STATES]
-STOP = 0.6
+STOP = 0.45
 
 
 def run_of(name: str, **changes: Any) -> Run:
@@ -117,6 +121,66 @@ def test_runs_of_which_nothing_is_said_have_a_reason(bump: Run) -> None:
         _motions(large, large.trajectory.time, np.full(14, 3.0), np.zeros(14))
 
 
+# ---------------------------------------------------------------------------------------------------- unknown roads
+@pytest.mark.parametrize("form", ["curv:45", "lip:0.7"])
+def test_rows_and_bound_on_a_class_of_roads(bump: Run, form: str) -> None:
+    """The bump is of both classes: its bound for the class is above its own, and its rows are not falsified."""
+    roads = road_class(form)
+    (rows, between), reason = certified_findings(bump, roads=roads)
+    assert reason == "" and rows.holds and between.holds
+    assert not certified_findings(tampered(bump, halved), roads=road_class("curv:45"))[0][0].holds
+
+
+def everywhere(run: Run, form: str) -> tuple[AllRoads, FittedRoad]:
+    t, heights = run.trajectory.time, run.trajectory.columns([q.name for q in ROAD_HEIGHTS])
+    road = fitted_road(t, heights, np.spacing(heights), road_class(form))
+    return on_all_roads(_motions(run, t, np.zeros(14), np.zeros(14), road), road), road
+
+
+def test_every_road_of_the_class_is_in_what_is_proved(bump: Run) -> None:
+    """Roads through the same heights, with parabolas of |h''| = 45 - 39.5 m/s² between rows, signs by chance or near
+    the wheels' own frequency: x stays within `off` of the fitted road's motion, and x - x_lin within its bound.
+    """
+    found, _ = everywhere(bump, "curv:45")
+    form, signal, norm = car_form(Car(), order=1), road_signal(road_parameters(bump.parameters)), energy_norm(Car())
+    rng, steps, parts = np.random.default_rng(4), 400, 16
+    fine = np.linspace(0.0, 1e-3 * steps, parts * steps + 1)
+    k = np.minimum(np.arange(len(fine)) // parts, steps - 1)
+    signs = np.stack(
+        [rng.choice([-1.0, 1.0], (4, steps)), np.tile(np.sign(np.sin(0.075 * np.arange(steps))), (4, 1))], 2
+    )
+    bows = 2.75 * ((fine - 1e-3 * k) * (1e-3 * (k + 1) - fine))[:, None]
+    inputs = np.stack([signal(fine)] * 2, axis=2)
+    inputs[:4] += signs[:, k] * bows  # their rates do nothing: the default car's tyres have no dampers
+    x = lin = np.zeros((14, 2))
+    rows = [(x, lin)]
+    h = 2e-3 / parts
+    for at in range(0, parts * steps, 2):
+        slopes = [(0.0 * x, 0.0 * lin)]
+        for part, i in ((0.0, at), (0.5, at + 1), (0.5, at + 1), (1.0, at + 2)):
+            y, z = x + part * h * slopes[-1][0], lin + part * h * slopes[-1][1]
+            slopes.append((form.rate(y, inputs[:, i]), form.A @ z + form.B @ inputs[:, i]))
+        x, lin = (
+            v + h / 6.0 * (slopes[1][n] + 2.0 * (slopes[2][n] + slopes[3][n]) + slopes[4][n])
+            for n, v in enumerate((x, lin))
+        )
+        rows.append((x, lin))
+    motion = np.array(rows)  # (N, 2, 14, 2)
+    expected, _, proved = found.motions.at(fine[::2])
+    for one in np.moveaxis(motion, 3, 0):
+        assert (np.abs(one[:, 0] - expected) <= found.off + proved + 1e-9).all()
+        assert norm((one[:, 0] - one[:, 1]).T).max() < found.largest_error(norm)
+    assert np.abs(motion[:, 0] - expected[:, :, None]).max() > 1e-4  # the roads are not all the same
+
+
+def test_a_coarser_class_proves_less_and_one_that_the_heights_leave_is_refused(bump: Run) -> None:
+    norm = energy_norm(Car())
+    bounds = [everywhere(bump, form)[0].largest_error(norm) for form in ("curv:40", "curv:80")]
+    assert bounds[0] < bounds[1]
+    with pytest.raises(InputError, match=r"rise faster than 0\.5 m/s"):
+        everywhere(bump, "lip:0.5")
+
+
 # ---------------------------------------------------------------------------------------------------- files
 def exported(run: Run, path: Path, form: str = "{!r}", every: int = 1, header: str = "{}") -> Path:
     """As another tool writes it: its own digits, rows and header."""
@@ -206,7 +270,9 @@ def test_a_gap_a_class_and_options_of_a_run_are_refused(
     assert check_file(path) == 2
     assert "row 101, column 'time': a gap of 0.004 s" in capsys.readouterr().err
     assert main(["check", str(path)]) == 2
-    assert main(["check", str(path), "--road-class", "curv:3"]) == 2
+    for wrong in ("curv", "curv:nan", "lip:-1", "smooth:3"):
+        assert main(["check", str(path), "--road-class", wrong]) == 2
+        assert "wanted exact, curv:H2" in capsys.readouterr().err
     assert main(["check", str(tmp_path), "--road-class", "exact"]) == 2
 
 
