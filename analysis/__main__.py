@@ -57,8 +57,10 @@ def _parser() -> argparse.ArgumentParser:
     verb.set_defaults(do=_simulate)
 
     verb = verbs.add_parser("check", help="check the claims on a run and write its findings.json")
-    verb.add_argument("run", type=Path, metavar="RUN", help="run folder")
-    verb.set_defaults(do=lambda o: _judge(read_run(o.run), o.run))
+    verb.add_argument("run", type=Path, metavar="RUN", help="run folder, or a .csv that another tool wrote")
+    verb.add_argument("--road-class", metavar="CLASS", help="for a .csv: 'exact', the scenario's profile is the road")
+    verb.add_argument("--parameters", metavar="SCENARIO", help=f"for a .csv: its car and road: {scenario}")
+    verb.set_defaults(do=_check)
 
     verb = verbs.add_parser("report", help="draw the figures of a run and write its report.html")
     verb.add_argument("run", type=Path, metavar="RUN", help="run folder")
@@ -198,14 +200,27 @@ def _simulate_counterpart(scenario: Scenario, run: Run, folder: Path) -> None:
     write_run(other, folder)
 
 
+def _check(options: argparse.Namespace) -> int:
+    if options.run.suffix == ".csv":
+        from .run_certificates import judge_export
+
+        return judge_export(options.run, options.road_class, options.parameters)
+    if options.road_class or options.parameters:
+        raise InputError(f"{options.run}: a run folder says its own road and car; wanted no options, or a .csv file")
+    return _judge(read_run(options.run), options.run)
+
+
 def _judge(run: Run, folder: Path) -> int:
     """Check, write findings.json, print a line for each; 0 if all hold, 1 if not."""
     from .check import check
     from .run_averaging import averaged_findings
+    from .run_certificates import certified_findings
     from .run_series import series_findings
 
     findings = check(run)
-    for name, (found, why_not) in (("averaging", averaged_findings(run)), ("series", series_findings(run))):
+    others = {"averaging": averaged_findings, "series": series_findings, "proof": certified_findings}
+    for name, judged in others.items():
+        found, why_not = judged(run)
         findings += found
         if why_not:
             print(f"{name}: not all is compared with the run: {why_not}", file=sys.stderr)

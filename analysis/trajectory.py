@@ -79,12 +79,13 @@ def read_csv(path: Path) -> Trajectory:
     """Read a trajectory. Raises InputError naming row and column of what cannot be a trajectory."""
     try:
         with path.open(encoding="utf-8", newline="") as file:
-            return _parsed(csv.reader(file), path)
+            return parsed(csv.reader(file), path)
     except (OSError, UnicodeDecodeError, csv.Error) as error:
         raise InputError(f"{path}: cannot be read: {error}") from error
 
 
-def _parsed(rows: Iterator[list[str]], path: Path) -> Trajectory:
+def parsed(rows: Iterator[list[str]], path: Path) -> Trajectory:
+    """A trajectory from the cells of its rows, header first. Raises InputError as `read_csv` does."""
     header = next(rows, [])
     if header[:1] != ["time"]:
         raise InputError(f"{path}: row 1: wanted a header that begins with 'time', got {header[:3] or 'nothing'}")

@@ -1,0 +1,130 @@
+"""Proofs about an exported run: which rows are of no motion of its car on its road, and the motion between the rows."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+from flint import fmpq
+
+from fmu_src.quantities import FORCES, ROAD_HEIGHTS, STATES
+
+from .bertolino_baksa.balls import NotProvedError, precision
+from .car_certificates import metric_of
+from .check import own_error
+from .discrepancy import scales
+from .errors import InputError
+from .exact_car import energy_norm, exact_system
+from .exported import read_export
+from .falsification import Motions, Rows, compare, motions
+from .findings import Finding
+from .polynomials import Array
+from .reference import car_of, road_parameters
+from .scenario import read_scenario
+from .trajectory import Run
+from .unknown_roads import FittedRoad, RoadClass, fitted_road, on_all_roads
+from .unknown_roads import road_class as read_class
+
+DEFAULT = "bump"  # scenario of an export without one: the default car on the paper's bump
+LONGEST = 10.0  # s from the first row that are judged
+
+
+def certified_findings(
+    run: Run,
+    rounding: Mapping[str, Array] | None = None,
+    file: str = "trajectory.csv",
+    roads: RoadClass | None = None,
+) -> tuple[list[Finding], str]:
+    """Findings on a passive run on a profile of ours, or on any road of a class; if there are none, why.
+
+    rounding : of each column's printed digits (N,); by default that of doubles.
+    """
+    columns = run.trajectory
+    u = [q.name for q in FORCES if q.name in columns.names]
+    if u and np.any(columns.columns(u)):
+        return [], "the actuators act, and the proof is of the car without them"
+    if len(columns.time) < 2:
+        return [], "a single row is no motion"
+    t = columns.time[columns.time <= columns.time[0] + LONGEST]
+
+    def digits(names: Sequence[str]) -> Array:
+        if rounding is None:
+            return np.spacing(np.abs(columns.columns([*names])))[: len(t)]
+        return np.stack([rounding[name] for name in names], axis=1)[: len(t)]
+
+    names = [q.name for q in STATES]
+    x, open_, own = columns.columns(names)[: len(t)], digits(names), own_error(run)
+    try:
+        if roads is None:
+            found = _motions(run, t, x[0], open_[0])
+            more, bound = np.zeros(len(names)), found.largest_error(energy_norm(car_of(run.parameters)))
+        else:
+            heights = [q.name for q in ROAD_HEIGHTS]
+            road = fitted_road(t, columns.columns(heights)[: len(t)], digits(heights), roads)
+            with precision(2):
+                everywhere = on_all_roads(_motions(run, t, x[0], open_[0], road), road)
+            found, more = everywhere.motions, everywhere.off
+            bound = everywhere.largest_error(energy_norm(car_of(run.parameters)))
+    except NotProvedError as error:
+        return [], str(error)
+    rows = compare(found, t, x, lambda expected: own * scales(expected) + more, open_)
+    return [_of_rows(rows, own, t, file), _between_rows(run, rows, bound, roads)], ""
+
+
+def judge_export(path: Path, road_class: str | None, scenario: str | None) -> int:
+    """Print what can be said of a CSV that another tool wrote; 0 if all holds, 1 if not or if nothing can be said.
+
+    Raises InputError for an unknown class of roads, and for what is no export.
+    """
+    if road_class is None:
+        raise InputError(f"{path}: wanted --road-class; a file alone says nothing of the road between its rows")
+    roads = None if road_class == "exact" else read_class(road_class)
+    run, rounding = read_export(path, read_scenario(scenario or DEFAULT))
+    findings, reason = certified_findings(run, rounding, str(path), roads)
+    if reason:
+        print(f"nothing is proved: {reason}")
+    for finding in findings:
+        print(finding.line)
+    return 0 if findings and all(finding.holds for finding in findings) else 1
+
+
+def _motions(run: Run, t: Array, x0: Array, rounding: Array, road: FittedRoad | None = None) -> Motions:
+    car = car_of(run.parameters)
+    with precision(2):
+        system = exact_system(car, road_parameters(run.parameters))
+    if road is not None:
+        system = replace(system, pieces=road.pieces, period=fmpq(0))
+    return motions(system, metric_of(car), x0, rounding, float(t[0]), float(t[-1]))
+
+
+def _of_rows(rows: Rows, own: float, t: Array, file: str) -> Finding:
+    first = "" if rows.first is None else f"; the first row out: {rows.first + 2}"
+    return Finding(
+        claim=f"no row is proved to be of another motion: distance from the proved tube of the motion from the first "
+        f"row, over what integrator ({own:.0e} of a state's maximum), printed digits and proof allow, to {t[-1]:g} s",
+        equation="(3.1)–(3.7)",
+        measured=rows.ratio,
+        expected=0.0,
+        tolerance=1.0,
+        unit="1",
+        source=f"{file}, row {rows.row + 2}, column {STATES[rows.state].name}, largest{first}",
+    )
+
+
+def _between_rows(run: Run, rows: Rows, bound: float, roads: RoadClass | None) -> Finding:
+    """The bound is of the exact motion from the first row; the run's own error comes on top of it at its rows."""
+    norm, road = energy_norm(car_of(run.parameters)), "this road" if roads is None else f"every road of class {roads}"
+    seen = float(norm(rows.e.T).max())
+    own = float(np.linalg.norm(np.abs(norm.T) @ rows.allowed.max(axis=0)))
+    return Finding(
+        claim="the run stays as near x_lin as is proved of the motion from its first row at all times, between the "
+        "rows too: largest N(x - x_lin) at a row, N the energy norm",
+        equation="(2.3), definition 2.1",
+        measured=float(norm((rows.off + rows.e).T).max()),
+        expected=0.0,
+        tolerance=bound + own,
+        unit="J^0.5",
+        source=f"proved on {road} for all t: {bound:.6g}, of which the motion reaches {seen:.6g} at the rows",
+    )
