@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from fmu_src.controller.design import design
+from fmu_src.controller.law import control_parameters
 
 from .bertolino_baksa.balls import NotProvedError
 from .bertolino_baksa.certificate import Certificate, Claim, to_json
@@ -20,7 +21,7 @@ from .car_certificates import certify_car
 from .certificate_command import statement
 from .files import write_whole
 from .polynomials import Array
-from .reference import Parameters, control_of
+from .reference import Parameters
 from .stabilization.full_car import strut_gain
 
 SHARES = (0.01, 0.1, 0.5)  # of the smaller largest ε, at which δ is compared
@@ -28,8 +29,8 @@ SHARES = (0.01, 0.1, 0.5)  # of the smaller largest ε, at which δ is compared
 
 def infinite_gain(parameters: Parameters) -> Array:
     """Gain (4, 14) of u = −gain x at the struts, by the controller of these parameters on its infinite horizon."""
-    made = design(control_of(parameters).car, infinite=True, span=None)
-    return -strut_gain(np.array(made.infinite).reshape(2, 4))
+    K = np.array(design(control_parameters(parameters).model, infinite=True, span=None).infinite)
+    return -strut_gain(K.reshape(2, 4)) if K.size == 8 else -K.reshape(4, 14)  # of the half car, of the full car
 
 
 def both(parameters: Parameters) -> tuple[tuple[Certificate, Proof], tuple[Certificate, Proof]]:

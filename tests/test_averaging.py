@@ -299,7 +299,7 @@ def test_the_cars_averages_are_the_corrected_3_20(column: int, least: float) -> 
     P, psi = printed_amplitude(m.eigenvalues, size * m.input(form.B)[:, column], omega)
     half = 0.02 * np.exp(1j * np.arange(7))
     s = np.concatenate([half, half.conj()])
-    x = print_of.Textbook(m.beta, omega, cubic, P, psi, np.zeros((14, 14)), size * parametric[..., column], s)
+    x = print_of.Textbook(m.beta, omega, cubic, P, psi, np.zeros((14, 14), complex), size * parametric[..., column], s)
     A, B = print_of.A_corrected(x.alpha_bar, P, psi), print_of.B_corrected(x)
     np.testing.assert_allclose(equations.linear, A + B, rtol=1e-9)
     expected = s * (m.eigenvalues.real + A + B + print_of.pair_sum(x, halved=True))

@@ -13,16 +13,16 @@ from analysis.bertolino_baksa.certificate import from_json, to_json, verify
 from analysis.car import car_form, road_signal
 from analysis.car_certificates import build
 from analysis.closed_loop_certificate import both, comparison, infinite_gain
-from analysis.reference import control_of, road_parameters
+from analysis.reference import road_parameters
 from analysis.scenario import read_scenario
 from fmu_src.controller.design import design
-from fmu_src.controller.law import control_law
+from fmu_src.controller.law import control_law, control_parameters
 from fmu_src.vehicle.parameters import Car
 
 
 def test_the_gain_is_what_the_controller_does() -> None:
-    control = dataclasses.replace(control_of({}), horizon="infinite", activation="at t_on", t_on=0.0)
-    law = control_law(control, design(control.car, infinite=True, span=None))
+    control = dataclasses.replace(control_parameters({}), horizon="infinite", activation="at t_on", t_on=0.0)
+    law = control_law(control, design(control.model, infinite=True, span=None))
     x = np.random.default_rng(1).normal(size=14)
     np.testing.assert_allclose(-infinite_gain({}) @ x, law(1.0, x.tolist()), rtol=1e-12)
 
