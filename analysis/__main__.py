@@ -82,10 +82,11 @@ def _parser() -> argparse.ArgumentParser:
     verb = verbs.add_parser("certify", help="prove that x_lin is almost stable (definition 2.1) on a scenario's road")
     verb.add_argument("scenario", help=scenario)
     verb.add_argument("-o", "--out", type=Path, metavar="CERT", help="certificate to write (JSON)")
-    verb.add_argument("--quick", action="store_true", help="a coarse floor in a second, by scalar comparison")
-    verb.add_argument("--largest", action="store_true", help="also search the largest amplitude that can be certified")
-    verb.add_argument("--closed-loop", action="store_true", help="under control for ever, and against no control")
-    verb.add_argument("--bounded", type=float, metavar="A", help="every road with |h| <= A [m] instead, around rest")
+    kind = verb.add_mutually_exclusive_group()
+    kind.add_argument("--quick", action="store_true", help="a coarse floor in a second, by scalar comparison")
+    kind.add_argument("--largest", action="store_true", help="also search the largest amplitude that can be certified")
+    kind.add_argument("--closed-loop", action="store_true", help="under control for ever, and against no control")
+    kind.add_argument("--bounded", type=float, metavar="A", help="every road with |h| <= A [m] instead, around rest")
     verb.set_defaults(do=_certify)
 
     verb = verbs.add_parser("verify", help="prove a certificate's claims anew")
@@ -272,6 +273,8 @@ def _certify(options: argparse.Namespace) -> int:
     from .certificate_command import make_certificate, quick_answer
 
     scenario = read_scenario(options.scenario)
+    if options.out and (options.quick or options.bounded is not None):
+        raise InputError(f"-o {options.out}: --quick and --bounded write no certificate; leave it out")
     if options.bounded is not None:
         from .car_bounded_roads import command
 

@@ -22,7 +22,7 @@ from .reference import Parameters, car_of
 
 CLOSE = 1.01  # ratio at which a bisection stops
 SHARES = (0.25, 0.5, 0.75, 1.0)  # of the largest δ, in the table of δ(ε)
-LEAST = 1e-6  # m, or in a norm: where a search begins at the latest
+LEAST = 1e-6  # of the first number: where a search ends
 
 
 def car_gains(parameters: Mapping[str, Any]) -> Gains:
@@ -35,9 +35,9 @@ def car_gains(parameters: Mapping[str, Any]) -> Gains:
 
 
 def heights(parameters: Parameters, A: float) -> Array:
-    """W (8,) of (h, ḣ). Raises InputError unless A ≥ 0, or for tyres with dampers, which feel rates without bound."""
-    if not 0.0 <= A < math.inf:
-        raise InputError(f"--bounded {A!r}: wanted a height in metres, at least 0")
+    """W (8,) of (h, ḣ). Raises InputError unless A > 0, or for tyres with dampers, which feel rates without bound."""
+    if not 0.0 < A < math.inf:
+        raise InputError(f"--bounded {A!r}: wanted a height in metres, greater than 0")
     car = car_of(parameters)
     if car.bp1 or car.bp2:
         raise InputError(
@@ -77,7 +77,7 @@ def _statement(parameters: Parameters, A: float, W: Array) -> list[str]:
     found, form = car_gains(parameters), car_form(car_of(parameters))
     rest = np.zeros(14)
     states, _ = found.motion(W, rest)
-    top = largest(lambda height: found.motion(heights(parameters, height), rest), max(A, LEAST))
+    top = largest(lambda height: found.motion(heights(parameters, height), rest), A)
     named = ", ".join(f"{q.name} {y:.3g} {q.unit}" for q, y in zip(STATES[:7], states[:7].tolist(), strict=True))
     lines = [
         f"psi = 0 is almost stable under every road of |h| <= {A:g} m, whatever its course; proved up to {top:.4g} m",
@@ -86,8 +86,8 @@ def _statement(parameters: Parameters, A: float, W: Array) -> list[str]:
     for norm in norms(car_of(parameters), (found.of_inputs @ W)[:, None]):
         most, spread = reached(form, worst_inputs(form, norm, W), norm), found.spread(norm)
         floor = found.epsilon(W, norm, [0.0])[0]
-        ratio = f" (a bang-bang road reaches {most:.4g}: ratio {floor / most:.3g})" if most else ""
-        top = largest(partial(_moved, found, W, spread), max(floor, LEAST))
+        ratio = f" (a bang-bang road reaches {most:.4g}: ratio {floor / most:.3g})"
+        top = largest(partial(_moved, found, W, spread), floor)
         delta = [share * top for share in SHARES]
         table = ", ".join(f"{e:.4g} for {d:.4g}" for e, d in zip(found.epsilon(W, norm, delta), delta, strict=True))
         lines.append(f"  {norm.name} norm: l = {floor:.4g}{ratio}; eps for delta: {table}")

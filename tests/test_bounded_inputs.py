@@ -82,10 +82,11 @@ def test_every_road_under_the_car() -> None:
 
 
 def test_roads_that_cannot_be_are_refused(capsys: pytest.CaptureFixture[str]) -> None:
-    for A in (-0.01, np.nan, np.inf):
+    for A in (-0.01, 0.0, np.nan, np.inf):
         with pytest.raises(InputError, match="wanted a height"):
             heights({}, A)
     with pytest.raises(InputError, match="tyres without dampers"):
         heights({"bp1": 10.0}, 0.01)
+    assert main(["certify", "bump", "--bounded", "0.01", "-o", "x.json"]) == 2
     assert main(["certify", "bump", "--bounded", "0.5"]) == 1
     assert "no certificate" in capsys.readouterr().out
