@@ -1,8 +1,8 @@
 """Cost of the series to order 2 on the default bump, all 14 states at 5000 times, beside a direct integration.
 
 Medians of CPU time over a few rounds: the exact sums (formed once, then evaluated), the quadrature on steps of 1 ms,
-and DOP853 at rtol 1e-12 on the full equations. A series is formed once for all amplitudes; an integration is for one. Last,
-the table of resonances on the default sine road.
+and DOP853 at rtol 1e-12 on the full equations. A series is formed once for all amplitudes; an integration is for one.
+Last, the table of resonances on the default sine road.
 """
 
 from __future__ import annotations
