@@ -14,7 +14,8 @@ G = 9.81  # m/s2
 
 
 def static_loads(run: Run) -> Array:
-    """Loads (4) [N] of the tyres fl, fr, rl, rr of the run's car at rest."""
+    """Loads (4) [N] of the tyres fl, fr, rl, rr of the run's car at rest. Raises InputError if it is not recorded."""
+    run.reals("m", "m11", "m12", "m21", "m22", "m2", "a", "b")  # no default may stand in for what was not recorded
     return static_loads_of(car_of(run.parameters))
 
 
