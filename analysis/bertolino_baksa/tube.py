@@ -210,8 +210,11 @@ def _closed(system: ExactSystem, metric: Metric, piece: Piece, V: float, defect:
     most = 2.0 * (V + defect * above(arb(piece.duration)))
     for _ in range(TRIES):
         box = [r + arb(0, n * most) for r, n in zip(ranges, metric.reach.tolist(), strict=True)]
-        growth = metric.size(jacobian(system, box, w) - metric.A) - metric.alpha
-        after = _grown(V, growth, defect, piece)
+        try:
+            growth = metric.size(jacobian(system, box, w) - metric.A) - metric.alpha
+            after = _grown(V, growth, defect, piece)
+        except NotProvedError:  # wider than numbers go
+            break
         if max(V, after) <= most:
             return after, growth
         most = 2.0 * max(after, most)
