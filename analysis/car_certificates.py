@@ -24,6 +24,7 @@ from .reference import Parameters, car_of, road_parameters
 
 AFTER_REST = (7.0, 14.0)  # the pieces last so many times 1/α beyond the last corner if the road then is flat,
 AFTER_PERIODIC = (13.0, 18.0, 23.0)  # and so many if it goes on: what is left of the start is as small as exp(−13) …
+ROUND_OFF = 1e-9  # of the largest eigenvalue: a decay below it is not told from none
 
 
 def model_of(parameters: Mapping[str, Any], gain: Array | None = None) -> dict[str, Any]:
@@ -89,8 +90,9 @@ def metric_of(car: Car, gain: Array | None = None) -> Array:
 
 def stops(system: ExactSystem, A: Array) -> list[fmpq]:
     """When the pieces may end: what is left of the start is small, and a whole number of periods is over."""
-    alpha = -float(np.linalg.eigvals(A).real.max())
-    if not alpha > 0.0:
+    roots = np.linalg.eigvals(A)
+    alpha = -float(roots.real.max())
+    if not alpha > ROUND_OFF * np.abs(roots).max():  # a rate of zero is computed as some 1e-16, of either sign
         raise NotProvedError(f"the linear car does not settle: growth rate {-alpha:.3g} 1/s; wanted < 0")
     corner, period = system.pieces[-1][0], system.period
     if period == 0:
