@@ -119,13 +119,13 @@ def _parser() -> argparse.ArgumentParser:
 
 
 def _spatial(options: argparse.Namespace) -> int:
-    from .spatial_scan import command
+    from .scans.spatial_scan import command
 
     return command(options.scenario, options.out)
 
 
 def _resonances(options: argparse.Namespace) -> int:
-    from .resonance_scan import command
+    from .scans.resonance_scan import command
 
     return command(options.scenario, options.scan, options.out)
 
@@ -203,7 +203,7 @@ def _simulate_counterpart(scenario: Scenario, run: Run, folder: Path) -> None:
 
 def _check(options: argparse.Namespace) -> int:
     if options.run.suffix == ".csv":
-        from .run_certificates import judge_export
+        from .certificates.run_certificates import judge_export
 
         return judge_export(options.run, options.road_class, options.parameters)
     if options.road_class or options.parameters:
@@ -213,9 +213,9 @@ def _check(options: argparse.Namespace) -> int:
 
 def _judge(run: Run, folder: Path) -> int:
     """Check, write findings.json, print a line for each; 0 if all hold, 1 if not."""
+    from .certificates.run_certificates import certified_findings
     from .check import check
     from .run_averaging import averaged_findings
-    from .run_certificates import certified_findings
     from .run_series import series_findings
 
     findings = check(run)
@@ -270,17 +270,17 @@ def _modes(options: argparse.Namespace) -> int:
 
 
 def _certify(options: argparse.Namespace) -> int:
-    from .certificate_command import make_certificate, quick_answer
+    from .certificates.certificate_command import make_certificate, quick_answer
 
     scenario = read_scenario(options.scenario)
     if options.out and (options.quick or options.bounded is not None):
         raise InputError(f"-o {options.out}: --quick and --bounded write no certificate; leave it out")
     if options.bounded is not None:
-        from .car_bounded_roads import command
+        from .certificates.car_bounded_roads import command
 
         return command(scenario.parameters, options.bounded)
     if options.closed_loop:
-        from .closed_loop_certificate import command as compare
+        from .certificates.closed_loop_certificate import command as compare
 
         return compare(scenario.parameters, options.out)
     if options.quick:
@@ -289,13 +289,13 @@ def _certify(options: argparse.Namespace) -> int:
 
 
 def _verify(options: argparse.Namespace) -> int:
-    from .certificate_command import judge_certificate
+    from .certificates.certificate_command import judge_certificate
 
     return judge_certificate(options.certificate)
 
 
 def _conditions(options: argparse.Namespace) -> int:
-    from .car_conditions import command
+    from .certificates.car_conditions import command
 
     return command(read_scenario(options.scenario).parameters)
 

@@ -18,10 +18,10 @@ from fmu_src.vehicle.equations import equations_of_motion
 from fmu_src.vehicle.linear import linearized
 from fmu_src.vehicle.parameters import Car
 
-from .polynomials import Array
-from .power_series import cos, sin, variables
-from .signals import Piece, Signal
-from .standard_form import Equations, Function, StandardForm, only, standard_form
+from .methods.polynomials import Array
+from .methods.power_series import cos, sin, variables
+from .methods.signals import Piece, Signal
+from .methods.standard_form import Equations, Function, StandardForm, only, standard_form
 
 
 def car_form(car: Car, *, gain: Array | None = None, forces: bool = False, order: int = 5) -> StandardForm:

@@ -11,8 +11,8 @@ from fmu_src.vehicle.linear import masses
 from fmu_src.vehicle.parameters import Car
 
 from .car import car_form, exact_A
-from .modes import Complex, Enclosures, Modes, enclosures, modes
-from .polynomials import Array
+from .methods.modes import Complex, Enclosures, Modes, enclosures, modes
+from .methods.polynomials import Array
 
 MOTIONS = (
     "heave",

@@ -14,7 +14,7 @@ from fmu_src.road.profiles import HARMONICS
 
 from .car import actuators, car_form, road_signal
 from .findings import Finding
-from .linear_response import held_response, linear_response
+from .methods.linear_response import held_response, linear_response
 from .reference import car_of, integrate, road_parameters
 from .trajectory import Array, Run
 

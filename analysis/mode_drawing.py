@@ -11,7 +11,7 @@ from fmu_src.vehicle.parameters import Car
 
 from .car_modes import CarModes
 from .figures import BLUE, ORANGE, Axes, render_pictures
-from .polynomials import Array
+from .methods.polynomials import Array
 
 HUB, PLATE, RADIUS = 0.30, 0.80, 0.27  # heights over the road at rest, and radius of the wheels [m]; for the eye only
 SWING = 0.22  # largest displacement drawn [m]

@@ -30,9 +30,9 @@ from fmu_src.vehicle.equations import equations_of_motion
 from fmu_src.vehicle.parameters import Car
 
 from .car import car_form
-from .polynomials import Array
-from .power_series import Monomial, cos, sin, variables
-from .standard_form import StandardForm, only
+from .methods.polynomials import Array
+from .methods.power_series import Monomial, cos, sin, variables
+from .methods.standard_form import StandardForm, only
 
 FACTORS: dict[str, tuple[Quantity, ...]] = {
     "v": RATES,

@@ -8,18 +8,18 @@ import numpy as np
 
 from fmu_src.quantities import FORCES, STATES
 
-from .amplitudes import stability
-from .averaging import AmplitudeEquations, average
 from .car import car_form, road_signal
 from .check import own_error
 from .errors import InputError
 from .findings import Finding
-from .modes import Complex
-from .polynomials import Array
+from .methods.amplitudes import stability
+from .methods.averaging import AmplitudeEquations, average
+from .methods.modes import Complex
+from .methods.polynomials import Array
+from .methods.resonance import resonances
+from .methods.signals import Piece
+from .methods.standard_form import StandardForm
 from .reference import car_of, road_parameters
-from .resonance import resonances
-from .signals import Piece
-from .standard_form import StandardForm
 from .trajectory import Run
 
 FEWEST = 10  # rows after the road's last edge

@@ -11,12 +11,12 @@ from .check import own_error
 from .discrepancy import scales
 from .errors import InputError
 from .findings import Finding
-from .modes import modes
-from .polynomials import Array
+from .methods.modes import modes
+from .methods.polynomials import Array
+from .methods.sampled_series import sampled_series
+from .methods.series import partial_sums, successive_ratios
 from .recorded_road import recorded_road
 from .reference import car_of
-from .sampled_series import sampled_series
-from .series import partial_sums, successive_ratios
 from .trajectory import Run
 
 ORDERS = 3  # that are compared with the run; one more term is formed, to know what the last one leaves

@@ -22,11 +22,11 @@ import analysis  # noqa: F401  before numpy: linear algebra in one thread
 import numpy as np
 
 from analysis.car import car_form, road_signal
-from analysis.modes import modes
+from analysis.methods.modes import modes
+from analysis.methods.resonance import resonances
+from analysis.methods.sampled_series import sampled_series
+from analysis.methods.series import exact_series
 from analysis.reference import integrate
-from analysis.resonance import resonances
-from analysis.sampled_series import sampled_series
-from analysis.series import exact_series
 from fmu_src.road.profiles import RoadParameters
 from fmu_src.vehicle.parameters import Car
 

@@ -19,8 +19,8 @@ from analysis.bertolino_baksa.majorant import majorant
 from analysis.bertolino_baksa.norms import Norm, euclid, modal_metric, weighted_sup
 from analysis.bertolino_baksa.proof import Proof
 from analysis.errors import InputError
-from analysis.signals import Signal, constant, harmonic
-from analysis.standard_form import StandardForm, standard_form
+from analysis.methods.signals import Signal, constant, harmonic
+from analysis.methods.standard_form import StandardForm, standard_form
 
 Equations = Callable[..., Sequence[Any]]
 PERIOD = fmpq(5, 2)

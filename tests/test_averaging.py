@@ -11,18 +11,18 @@ from orders import observed_order
 from scipy.optimize import brentq
 from scipy.special import ellipk
 
-from analysis.amplitudes import equilibria, stability, steady_states
 from analysis.audit import averaging as print_of
 from analysis.audit.modal import printed_amplitude
-from analysis.averaging import AmplitudeEquations, average
 from analysis.car import car_form, road_signal
 from analysis.errors import InputError
-from analysis.floquet import floquet, period_of, rate_and_slope
-from analysis.modal_polynomials import linear_map
-from analysis.modes import modal, modes
-from analysis.nonlinear_response import nonlinear_response
-from analysis.signals import Piece, Signal, harmonic
-from analysis.standard_form import StandardForm, standard_form
+from analysis.methods.amplitudes import equilibria, stability, steady_states
+from analysis.methods.averaging import AmplitudeEquations, average
+from analysis.methods.floquet import floquet, period_of, rate_and_slope
+from analysis.methods.modal_polynomials import linear_map
+from analysis.methods.modes import modal, modes
+from analysis.methods.nonlinear_response import nonlinear_response
+from analysis.methods.signals import Piece, Signal, harmonic
+from analysis.methods.standard_form import StandardForm, standard_form
 from fmu_src.road.profiles import RoadParameters
 from fmu_src.vehicle.parameters import Car
 

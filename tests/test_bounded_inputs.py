@@ -13,11 +13,11 @@ from analysis.bertolino_baksa.balls import NotProvedError, precision
 from analysis.bertolino_baksa.bounded_inputs import Gains, gains, reached, worst_inputs
 from analysis.bertolino_baksa.norms import euclid, modal_metric, proved_metric, weighted_sup
 from analysis.car import car_form
-from analysis.car_bounded_roads import car_gains, heights
+from analysis.certificates.car_bounded_roads import car_gains, heights
+from analysis.certificates.exact_car import norms
 from analysis.errors import InputError
-from analysis.exact_car import norms
-from analysis.signals import Piece, Signal
-from analysis.standard_form import StandardForm, standard_form
+from analysis.methods.signals import Piece, Signal
+from analysis.methods.standard_form import StandardForm, standard_form
 from fmu_src.vehicle.parameters import Car
 
 

@@ -16,13 +16,13 @@ from analysis.bertolino_baksa.balls import NotProvedError, precision
 from analysis.bertolino_baksa.certificate import Certificate, from_json, to_json, verify
 from analysis.bertolino_baksa.proof import Proof
 from analysis.car import car_form, road_signal
-from analysis.car_certificates import build, certify_car, prove_reference
+from analysis.certificates.car_certificates import build, certify_car, prove_reference
 from analysis.cosimulation import simulate
-from analysis.linear_response import linear_response
+from analysis.methods.linear_response import linear_response
+from analysis.methods.signals import Signal
+from analysis.methods.standard_form import StandardForm
 from analysis.reference import car_of, road_parameters
 from analysis.scenario import read_scenario
-from analysis.signals import Signal
-from analysis.standard_form import StandardForm
 from fmu_src.quantities import STATES
 
 REST = np.zeros(14)

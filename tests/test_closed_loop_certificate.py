@@ -11,8 +11,8 @@ from analysis.bertolino_baksa.adversary import excursions
 from analysis.bertolino_baksa.balls import NotProvedError
 from analysis.bertolino_baksa.certificate import from_json, to_json, verify
 from analysis.car import car_form, road_signal
-from analysis.car_certificates import build
-from analysis.closed_loop_certificate import both, comparison, infinite_gain
+from analysis.certificates.car_certificates import build
+from analysis.certificates.closed_loop_certificate import both, comparison, infinite_gain
 from analysis.reference import road_parameters
 from analysis.scenario import read_scenario
 from fmu_src.controller.design import design

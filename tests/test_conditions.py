@@ -17,12 +17,12 @@ from analysis.bertolino_baksa.conditions import Verdict, conditions, growth_of
 from analysis.bertolino_baksa.norms import proved_metric
 from analysis.bertolino_baksa.proof import Proof, prove
 from analysis.car import car_form
-from analysis.car_conditions import car_verdicts
-from analysis.floquet import floquet
-from analysis.modes import modes
+from analysis.certificates.car_conditions import car_verdicts
+from analysis.methods.floquet import floquet
+from analysis.methods.modes import modes
+from analysis.methods.signals import Piece, harmonic
+from analysis.methods.standard_form import standard_form
 from analysis.scenario import read_scenario
-from analysis.signals import Piece, harmonic
-from analysis.standard_form import standard_form
 from fmu_src.vehicle.parameters import Car
 
 

@@ -15,7 +15,7 @@ from analysis.check import check
 from analysis.cosimulation import simulate
 from analysis.discrepancy import linear_states, scales
 from analysis.errors import InputError
-from analysis.linear_response import held_response
+from analysis.methods.linear_response import held_response
 from analysis.scenario import Scenario, read_scenario
 from analysis.trajectory import Run
 from fmu_src.quantities import FORCES, STATES

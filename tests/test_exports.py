@@ -14,15 +14,15 @@ import pytest
 from analysis.__main__ import main
 from analysis.bertolino_baksa.balls import NotProvedError
 from analysis.car import car_form, road_signal
+from analysis.certificates.exact_car import energy_norm
+from analysis.certificates.exported import _rounding
+from analysis.certificates.run_certificates import _motions, certified_findings
+from analysis.certificates.unknown_roads import AllRoads, FittedRoad, fitted_road, on_all_roads, road_class
 from analysis.cosimulation import simulate
 from analysis.errors import InputError
-from analysis.exact_car import energy_norm
-from analysis.exported import _rounding
 from analysis.reference import road_parameters
-from analysis.run_certificates import _motions, certified_findings
 from analysis.scenario import built_in_scenarios, read_scenario
 from analysis.trajectory import Run, write_csv
-from analysis.unknown_roads import AllRoads, FittedRoad, fitted_road, on_all_roads, road_class
 from fmu_src.quantities import ROAD_HEIGHTS, STATES
 from fmu_src.vehicle.parameters import Car
 

@@ -19,9 +19,9 @@ from analysis.car import car_form, exact_A, road_signal
 from analysis.car_modes import MOTIONS, car_modes, energy_shares
 from analysis.energy import kinetic_energy
 from analysis.errors import InputError
-from analysis.linear_response import periodic_response
-from analysis.modes import Enclosures, enclosures, modal, modes
-from analysis.standard_form import standard_form
+from analysis.methods.linear_response import periodic_response
+from analysis.methods.modes import Enclosures, enclosures, modal, modes
+from analysis.methods.standard_form import standard_form
 from fmu_src.road.profiles import RoadParameters
 from fmu_src.vehicle.linear import extensions, wheel_heights
 from fmu_src.vehicle.parameters import Car

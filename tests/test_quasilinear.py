@@ -14,7 +14,7 @@ from orders import observed_order
 
 from analysis.car import car_form, road_signal
 from analysis.car_modes import car_modes
-from analysis.linear_response import linear_response
+from analysis.methods.linear_response import linear_response
 from analysis.mode_report import write
 from analysis.quasilinear import FACTORS, TERMS, Quasilinear, Tensor, quasilinear, quasilinear_form, symbolic
 from fmu_src.quantities import PARAMETERS

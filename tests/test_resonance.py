@@ -13,17 +13,17 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 
-from analysis import resonance_scan
 from analysis.__main__ import main
 from analysis.car import car_form, road_signal
-from analysis.car_scans import VARIATIONS, variation
 from analysis.errors import InputError
-from analysis.modes import modes
+from analysis.methods.modes import modes
+from analysis.methods.resonance import Resonance, Resonances, remark_as_printed, resonances
+from analysis.methods.signals import harmonic
+from analysis.methods.standard_form import StandardForm, standard_form
 from analysis.reference import Parameters
-from analysis.resonance import Resonance, Resonances, remark_as_printed, resonances
-from analysis.resonance_scan import scan
-from analysis.signals import harmonic
-from analysis.standard_form import StandardForm, standard_form
+from analysis.scans import resonance_scan
+from analysis.scans.car_scans import VARIATIONS, variation
+from analysis.scans.resonance_scan import scan
 from fmu_src.quantities import PARAMETERS
 from fmu_src.road.profiles import RoadParameters
 from fmu_src.vehicle.parameters import Car

@@ -9,7 +9,7 @@ import pytest
 from made_up_run import made_up_run
 
 from analysis.car import car_form, road_signal
-from analysis.nonlinear_response import nonlinear_response
+from analysis.methods.nonlinear_response import nonlinear_response
 from analysis.reference import Parameters, car_of, road_parameters
 from analysis.run_averaging import averaged_findings, stretch_of
 from analysis.trajectory import Run, Trajectory

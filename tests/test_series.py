@@ -13,12 +13,12 @@ from scipy.integrate import quad_vec, solve_ivp
 
 from analysis.car import car_form, road_signal, without_cubic_stiffness
 from analysis.errors import InputError
-from analysis.exponentials import Exponentials, forced_modes, time_scales
-from analysis.modes import modes
-from analysis.sampled_series import sampled_series
-from analysis.series import Series, common_rates, exact_series, partial_sums, successive_ratios
-from analysis.signals import Piece, Signal, harmonic
-from analysis.standard_form import StandardForm, only, perturbed, standard_form
+from analysis.methods.exponentials import Exponentials, forced_modes, time_scales
+from analysis.methods.modes import modes
+from analysis.methods.sampled_series import sampled_series
+from analysis.methods.series import Series, common_rates, exact_series, partial_sums, successive_ratios
+from analysis.methods.signals import Piece, Signal, harmonic
+from analysis.methods.standard_form import StandardForm, only, perturbed, standard_form
 from fmu_src.road.profiles import RoadParameters
 from fmu_src.vehicle.parameters import Car
 

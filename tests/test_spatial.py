@@ -10,17 +10,17 @@ import numpy as np
 import pytest
 from orders import observed_order
 
-from analysis import spatial_scan
 from analysis.__main__ import main
 from analysis.car import car_form
 from analysis.errors import InputError
-from analysis.linear_response import linear_response
-from analysis.nonlinear_response import nonlinear_response
+from analysis.methods.linear_response import linear_response
+from analysis.methods.nonlinear_response import nonlinear_response
+from analysis.methods.signals import constant, harmonic
+from analysis.methods.spatial import Transfer, transfer, undamped_modes
+from analysis.methods.standard_form import StandardForm, standard_form
 from analysis.reference import Parameters
-from analysis.signals import constant, harmonic
-from analysis.spatial import Transfer, transfer, undamped_modes
-from analysis.spatial_scan import car_modes, motions, transfer_of
-from analysis.standard_form import StandardForm, standard_form
+from analysis.scans import spatial_scan
+from analysis.scans.spatial_scan import car_modes, motions, transfer_of
 from fmu_src.vehicle.parameters import Car
 
 ONE_WHEEL: Parameters = {

@@ -18,8 +18,8 @@ from scipy.integrate import solve_ivp
 from scipy.linalg import solve_continuous_are
 
 from analysis.errors import InputError
-from analysis.linear_response import linear_response
-from analysis.signals import Piece, Signal
+from analysis.methods.linear_response import linear_response
+from analysis.methods.signals import Piece, Signal
 from analysis.stabilization import document, study
 from analysis.stabilization.half_car import (
     axle_road,

@@ -15,11 +15,11 @@ from scipy.integrate import solve_ivp
 
 from analysis.car import car_form, road_signal
 from analysis.errors import InputError
-from analysis.linear_response import linear_response, periodic_response
-from analysis.polynomials import homogeneous
-from analysis.power_series import PowerSeries, cos, sin, variables
-from analysis.signals import constant, harmonic
-from analysis.standard_form import StandardForm, standard_form
+from analysis.methods.linear_response import linear_response, periodic_response
+from analysis.methods.polynomials import homogeneous
+from analysis.methods.power_series import PowerSeries, cos, sin, variables
+from analysis.methods.signals import constant, harmonic
+from analysis.methods.standard_form import StandardForm, standard_form
 from fmu_src.quantities import PARAMETERS
 from fmu_src.road.profiles import RoadParameters, road
 from fmu_src.vehicle.linear import linearized

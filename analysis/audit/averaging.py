@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 
 from fmu_src.quantities import PARAMETERS
 
-from .. import modes
-from ..modes import Complex
+from ..methods import modes
+from ..methods.modes import Complex
 from . import modal
 from .rows import Evidence, Row
 

@@ -9,13 +9,13 @@ import numpy as np
 from fmu_src.road.profiles import RoadParameters
 from fmu_src.vehicle.parameters import Car
 
-from .. import modes as product
 from ..car import car_form
-from ..linear_response import periodic_response
-from ..modes import Complex, Modes
-from ..polynomials import Homogeneous
-from ..signals import harmonic
-from ..standard_form import StandardForm
+from ..methods import modes as product
+from ..methods.linear_response import periodic_response
+from ..methods.modes import Complex, Modes
+from ..methods.polynomials import Homogeneous
+from ..methods.signals import harmonic
+from ..methods.standard_form import StandardForm
 from .rows import RIGHT, Evidence, Row
 
 

@@ -11,7 +11,7 @@ from collections.abc import Callable
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from ..polynomials import Array
+from ..methods.polynomials import Array
 
 OMEGA, P = 2.0, 0.7  # forcing frequency; x_lin = P sin Ωt, so F = P (1 − Ω²)
 ONE_PERIOD = np.linspace(0.0, 2.0 * np.pi, 512, endpoint=False)  # a mean over these is exact for trigonometric sums

@@ -12,7 +12,7 @@ from scipy.linalg import expm, solve_continuous_are, solve_continuous_lyapunov
 from fmu_src.controller.halfcar import HalfCar
 from fmu_src.vehicle.parameters import Car
 
-from ..polynomials import Array
+from ..methods.polynomials import Array
 from .differences import plain
 from .rows import RIGHT, Evidence, Row
 from .system import derived as full_car

@@ -15,7 +15,7 @@ from fmu_src.vehicle.parameters import Car
 
 from ..car import road_signal
 from ..derivation import PARAMETERS, derive
-from ..linear_response import linear_response
+from ..methods.linear_response import linear_response
 from ..reference import in_stretches
 from . import printed_car
 from .differences import SIGNS, Difference, derived_equations

@@ -12,9 +12,9 @@ import numpy as np
 from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 
-from ..linear_response import linear_response
-from ..signals import Piece, Signal
-from ..standard_form import StandardForm
+from ..methods.linear_response import linear_response
+from ..methods.signals import Piece, Signal
+from ..methods.standard_form import StandardForm
 from .balls import Array
 from .norms import Norm
 

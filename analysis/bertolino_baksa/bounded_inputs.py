@@ -14,9 +14,9 @@ import numpy as np
 from flint import fmpq
 from scipy.linalg import expm
 
-from ..signals import Piece as Constant
-from ..signals import Signal
-from ..standard_form import StandardForm
+from ..methods.signals import Piece as Constant
+from ..methods.signals import Signal
+from ..methods.standard_form import StandardForm
 from .adversary import motions
 from .balls import Array, ExactSystem, NotProvedError, matrix, rounded
 from .cells import CELLS, Decay, decay

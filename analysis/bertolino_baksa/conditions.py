@@ -12,12 +12,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..amplitudes import Stability, stability
-from ..averaging import average
-from ..modal_polynomials import exponents, modal_parts, waves
-from ..modes import Complex, modes
-from ..signals import Piece
-from ..standard_form import StandardForm
+from ..methods.amplitudes import Stability, stability
+from ..methods.averaging import average
+from ..methods.modal_polynomials import exponents, modal_parts, waves
+from ..methods.modes import Complex, modes
+from ..methods.signals import Piece
+from ..methods.standard_form import StandardForm
 from .balls import NotProvedError
 from .proof import Proof, rest_growth
 

@@ -14,7 +14,7 @@ import numpy as np
 from flint import arb, arb_series
 from numpy.typing import NDArray
 
-from ..power_series import PowerSeries, cos, sin, variables
+from ..methods.power_series import PowerSeries, cos, sin, variables
 from .balls import Array, ExactSystem, NotProvedError, above, coefficients, precision
 
 ORDER = 5

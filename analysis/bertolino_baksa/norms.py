@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from flint import arb, arb_mat
 
-from ..modes import modes
+from ..methods.modes import modes
 from .balls import Array, ExactSystem, NotProvedError, below, jacobian, length, magnitudes, matrix, rounded, two_norm
 
 

@@ -17,18 +17,7 @@ from typing import Any
 import numpy as np
 from flint import arb, arb_mat, arb_poly, arb_series, fmpq
 
-from .balls import (
-    Array,
-    ExactSystem,
-    NotProvedError,
-    above,
-    coefficients,
-    column,
-    cosine,
-    jacobian,
-    precision,
-    sine,
-)
+from .balls import Array, ExactSystem, NotProvedError, above, coefficients, column, cosine, jacobian, precision, sine
 from .norms import Metric
 
 Outputs = Callable[[Sequence[Any], Sequence[Any], Any, Any], Sequence[Any]]

@@ -12,7 +12,7 @@ import numpy as np
 from flint import arb, arb_mat, fmpq
 
 from ..bertolino_baksa.balls import decimal, precision
-from ..polynomials import Array
+from ..methods.polynomials import Array
 
 Plant = Callable[[Mapping[str, Any]], tuple[Sequence[Sequence[Any]], Sequence[Sequence[Any]]]]
 Box = Mapping[str, tuple[fmpq, fmpq]]

@@ -15,7 +15,7 @@ from fmu_src.vehicle.linear import linearized
 from fmu_src.vehicle.parameters import Car
 
 from ..bertolino_baksa.balls import decimal
-from ..polynomials import Array
+from ..methods.polynomials import Array
 from .certified import Plant
 
 VARIED = ("m", "c1", "c2")

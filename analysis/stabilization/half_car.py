@@ -10,9 +10,9 @@ from fmu_src.controller.halfcar import HalfCar
 from fmu_src.road.profiles import RoadParameters
 
 from ..car import road_signal
-from ..linear_response import linear_response
-from ..polynomials import Array
-from ..signals import Piece, Signal
+from ..methods.linear_response import linear_response
+from ..methods.polynomials import Array
+from ..methods.signals import Piece, Signal
 from .regulator import Regulator
 
 FRONT, REAR = 0, 2  # wheels of the left side, under which the half car runs

@@ -8,7 +8,7 @@ import numpy as np
 
 from fmu_src.controller.riccati import finite_horizon
 
-from ..polynomials import Array
+from ..methods.polynomials import Array
 from .regulator import Regulator, stationary
 
 FROM, TO = 1e-3, 1e-7  # what of L is still to come at the times to go that are looked at: far above round-off

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import brentq, minimize_scalar
 
-from ..polynomials import Array
+from ..methods.polynomials import Array
 
 DECADES = (-2.0, 5.0)  # of the frequencies looked at [rad/s]
 PER_DECADE = 200

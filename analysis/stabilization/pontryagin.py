@@ -9,7 +9,7 @@ from scipy.sparse import block_array, eye_array, kron
 from scipy.sparse.linalg import spsolve
 
 from ..errors import InputError
-from ..polynomials import Array
+from ..methods.polynomials import Array
 from .regulator import Arc, Regulator
 
 

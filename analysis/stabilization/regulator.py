@@ -12,7 +12,7 @@ from scipy.linalg import expm
 from fmu_src.controller.riccati import finite_horizon, infinite_horizon
 
 from ..errors import InputError
-from ..polynomials import Array
+from ..methods.polynomials import Array
 
 RESOLUTION = 0.03  # of the fastest time constant, between two entries of L: its spline is then right to 1e-11
 DEGREE = 7

@@ -14,23 +14,14 @@ from fmu_src.quantities import PARAMETERS
 from fmu_src.road.profiles import RoadParameters
 from fmu_src.vehicle.parameters import Car
 
-from ..polynomials import Array
+from ..methods.polynomials import Array
 from .certified import Certified, Plant, around, certify, growth
 from .full_car import car_plant, half_car_plant, strut_gain, varied_values
 from .half_car import Model, come_down, corrected, over_the_bump, printed, printed_control
 from .limit import Approach, approach
 from .margins import Margins, margins
 from .pontryagin import by_collocation, by_exponentials, hamiltonian
-from .regulator import (
-    Arc,
-    Regulator,
-    by_riccati,
-    energy_to_rest,
-    instants,
-    quadrature,
-    riccati_solution,
-    stationary,
-)
+from .regulator import Arc, Regulator, by_riccati, energy_to_rest, instants, quadrature, riccati_solution, stationary
 
 STEP = 1e-3  # s, between two samples of an arc
 SPREAD = 0.3  # of mass and stiffness

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from .bertolino_baksa.conditions import Verdict, conditions
-from .car import car_form, road_signal
+from ..bertolino_baksa.conditions import Verdict, conditions
+from ..car import car_form, road_signal
+from ..methods.signals import Piece
+from ..reference import Parameters, car_of, road_parameters
 from .car_certificates import prove_reference
-from .reference import Parameters, car_of, road_parameters
-from .signals import Piece
 
 TITLES = {
     "C0": "conditions 1 and 2 after (2.11), as printed",

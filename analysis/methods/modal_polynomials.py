@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .errors import InputError
+from ..errors import InputError
 from .modes import Complex, Modes
 from .polynomials import Array, Homogeneous
 from .signals import Piece

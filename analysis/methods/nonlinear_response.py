@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.integrate import solve_ivp
 
-from .errors import InputError
+from ..errors import InputError
 from .polynomials import Array
 from .signals import Piece, Signal, constant
 from .standard_form import StandardForm

@@ -12,10 +12,10 @@ import numpy as np
 
 from fmu_src.quantities import STATES, TABLE
 
-from .errors import InputError
-from .polynomials import Array
-from .scenario import Scenario
-from .trajectory import Run, Trajectory, parsed
+from ..errors import InputError
+from ..methods.polynomials import Array
+from ..scenario import Scenario
+from ..trajectory import Run, Trajectory, parsed
 
 GAP = 1.5  # times the median step; more between two rows is a gap
 _NAME = re.compile(r"\s*(?:(?:vehicle|road|controller)\.)?(.*?)\s*(?:\[(.*)\])?\s*")

@@ -11,19 +11,19 @@ from flint import fmpq
 
 from fmu_src.quantities import FORCES, ROAD_HEIGHTS, STATES
 
-from .bertolino_baksa.balls import NotProvedError, precision
+from ..bertolino_baksa.balls import NotProvedError, precision
+from ..check import own_error
+from ..discrepancy import scales
+from ..errors import InputError
+from ..findings import Finding
+from ..methods.polynomials import Array
+from ..reference import car_of, road_parameters
+from ..scenario import read_scenario
+from ..trajectory import Run
 from .car_certificates import metric_of
-from .check import own_error
-from .discrepancy import scales
-from .errors import InputError
 from .exact_car import energy_norm, exact_system
 from .exported import read_export
 from .falsification import Motions, Rows, compare, motions
-from .findings import Finding
-from .polynomials import Array
-from .reference import car_of, road_parameters
-from .scenario import read_scenario
-from .trajectory import Run
 from .unknown_roads import FittedRoad, RoadClass, fitted_road, on_all_roads
 from .unknown_roads import road_class as read_class
 

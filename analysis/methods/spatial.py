@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg import eigh
 
-from .errors import InputError
+from ..errors import InputError
 from .polynomials import Array
 
 

@@ -14,10 +14,10 @@ from fmu_src.road.profiles import RoadParameters
 from fmu_src.vehicle.linear import linearized, masses
 from fmu_src.vehicle.parameters import Car
 
-from .bertolino_baksa.balls import ExactSystem, decimal
-from .bertolino_baksa.norms import Norm, euclid, weighted_sup
-from .car import car_equations
-from .polynomials import Array
+from ..bertolino_baksa.balls import ExactSystem, decimal
+from ..bertolino_baksa.norms import Norm, euclid, weighted_sup
+from ..car import car_equations
+from ..methods.polynomials import Array
 
 LEAST = 1e-3
 NEVER = fmpq(1000000)  # s; where a wheel meets no road

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from .figures import BLUE, ORANGE, PURPLE, RED, TEAL, Axes, Panel, Subject, render
-from .polynomials import Array
+from ..figures import BLUE, ORANGE, PURPLE, RED, TEAL, Axes, Panel, Subject, render
+from ..methods.polynomials import Array
 from .resonance_scan import Key, Scan
 
 GREY, COLOURS = "#999999", (BLUE, ORANGE, TEAL, PURPLE, RED, "#bbaa33")

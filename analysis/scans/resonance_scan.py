@@ -11,16 +11,16 @@ from typing import Any
 
 import numpy as np
 
+from ..errors import InputError
+from ..files import write_whole
+from ..methods.floquet import period_of
+from ..methods.modes import modes
+from ..methods.polynomials import Array
+from ..methods.resonance import Resonance, Resonances, remark_as_printed, resonances
+from ..parallel import mapped
+from ..reference import Parameters
+from ..scenario import read_scenario
 from .car_scans import Variation, lasting_road, system_of, variation
-from .errors import InputError
-from .files import write_whole
-from .floquet import period_of
-from .modes import modes
-from .parallel import mapped
-from .polynomials import Array
-from .reference import Parameters
-from .resonance import Resonance, Resonances, remark_as_printed, resonances
-from .scenario import read_scenario
 
 SHOWN = 15  # rows on the terminal
 POINTS = 61  # of a scan, from half to twice the scenario's value

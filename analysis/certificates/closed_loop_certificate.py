@@ -14,15 +14,15 @@ import numpy as np
 from fmu_src.controller.design import design
 from fmu_src.controller.law import control_parameters
 
-from .bertolino_baksa.balls import NotProvedError
-from .bertolino_baksa.certificate import Certificate, Claim, to_json
-from .bertolino_baksa.proof import Proof
+from ..bertolino_baksa.balls import NotProvedError
+from ..bertolino_baksa.certificate import Certificate, Claim, to_json
+from ..bertolino_baksa.proof import Proof
+from ..files import write_whole
+from ..methods.polynomials import Array
+from ..reference import Parameters
+from ..stabilization.full_car import strut_gain
 from .car_certificates import certify_car
 from .certificate_command import statement
-from .files import write_whole
-from .polynomials import Array
-from .reference import Parameters
-from .stabilization.full_car import strut_gain
 
 SHARES = (0.01, 0.1, 0.5)  # of the smaller largest ε, at which δ is compared
 

@@ -11,14 +11,14 @@ import numpy as np
 
 from fmu_src.quantities import STATES
 
-from .bertolino_baksa.balls import Array, NotProvedError, precision
-from .bertolino_baksa.bounded_inputs import Gains, gains, reached, worst_inputs
-from .bertolino_baksa.norms import proved_metric
-from .car import car_form
+from ..bertolino_baksa.balls import Array, NotProvedError, precision
+from ..bertolino_baksa.bounded_inputs import Gains, gains, reached, worst_inputs
+from ..bertolino_baksa.norms import proved_metric
+from ..car import car_form
+from ..errors import InputError
+from ..reference import Parameters, car_of
 from .car_certificates import build, metric_of, model_of
-from .errors import InputError
 from .exact_car import norms
-from .reference import Parameters, car_of
 
 CLOSE = 1.01  # ratio at which a bisection stops
 SHARES = (0.25, 0.5, 0.75, 1.0)  # of the largest δ, in the table of δ(ε)

@@ -10,7 +10,7 @@ import numpy as np
 from scipy.integrate import solve_ivp
 from scipy.optimize import linear_sum_assignment
 
-from .errors import InputError
+from ..errors import InputError
 from .linear_response import periodic_response
 from .modes import Complex, modes
 from .polynomials import Array

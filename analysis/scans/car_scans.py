@@ -9,11 +9,11 @@ import numpy as np
 
 from fmu_src.quantities import PARAMETERS
 
-from .car import car_form, road_signal
-from .errors import InputError
-from .reference import Parameters, car_of, road_parameters
-from .signals import Piece, Signal
-from .standard_form import StandardForm
+from ..car import car_form, road_signal
+from ..errors import InputError
+from ..methods.signals import Piece, Signal
+from ..methods.standard_form import StandardForm
+from ..reference import Parameters, car_of, road_parameters
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

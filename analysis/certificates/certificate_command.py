@@ -11,20 +11,20 @@ import numpy as np
 from fmu_src.quantities import CORNER_WORDS, PARAMETERS, STATES
 from fmu_src.vehicle.equations import equations_of_motion
 
-from .bertolino_baksa.adversary import reference_floor
-from .bertolino_baksa.balls import NotProvedError, precision
-from .bertolino_baksa.cells import errors_of_states, outputs
-from .bertolino_baksa.certificate import Certificate, from_json, to_json, verify
-from .bertolino_baksa.norms import proved_metric
-from .bertolino_baksa.proof import Proof
-from .bertolino_baksa.quick import quick_floors
-from .car import car_form, road_signal
+from ..bertolino_baksa.adversary import reference_floor
+from ..bertolino_baksa.balls import NotProvedError, precision
+from ..bertolino_baksa.cells import errors_of_states, outputs
+from ..bertolino_baksa.certificate import Certificate, from_json, to_json, verify
+from ..bertolino_baksa.norms import proved_metric
+from ..bertolino_baksa.proof import Proof
+from ..bertolino_baksa.quick import quick_floors
+from ..car import car_form, road_signal
+from ..files import write_whole
+from ..methods.linear_response import linear_response
+from ..reference import Parameters, car_of, road_parameters
+from ..tyres import static_loads_of
 from .car_certificates import build, certify_car, metric_of, model_of, prove_reference, stops
 from .exact_car import exact_car, norms
-from .files import write_whole
-from .linear_response import linear_response
-from .reference import Parameters, car_of, road_parameters
-from .tyres import static_loads_of
 
 CLOSE = 1.02  # ratio at which the bisection for the largest amplitude stops
 TINY = 1e-6  # m; below it the search for an amplitude is given up

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .errors import InputError
+from ..errors import InputError
 from .polynomials import Array, Homogeneous, parts
 from .power_series import Monomial, PowerSeries, cos, sin, variables
 

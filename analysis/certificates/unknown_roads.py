@@ -16,13 +16,13 @@ import numpy as np
 from flint import arb, arb_mat, fmpq
 from numpy.polynomial import chebyshev, polynomial
 
-from .bertolino_baksa.balls import Array, decimal, rounded
-from .bertolino_baksa.cells import Decay, counts, decay, errors, inputs, ranges, widths
-from .bertolino_baksa.growth import perturbed
-from .bertolino_baksa.majorant import majorant
-from .bertolino_baksa.norms import Norm
-from .bertolino_baksa.tube import input_matrix
-from .errors import InputError
+from ..bertolino_baksa.balls import Array, decimal, rounded
+from ..bertolino_baksa.cells import Decay, counts, decay, errors, inputs, ranges, widths
+from ..bertolino_baksa.growth import perturbed
+from ..bertolino_baksa.majorant import majorant
+from ..bertolino_baksa.norms import Norm
+from ..bertolino_baksa.tube import input_matrix
+from ..errors import InputError
 from .falsification import Motions
 
 LONGEST, DEGREE = 0.02, 5  # s, of a polynomial, and its degree

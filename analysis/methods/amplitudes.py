@@ -7,8 +7,8 @@ from itertools import combinations
 
 import numpy as np
 
+from ..errors import InputError
 from .averaging import AmplitudeEquations
-from .errors import InputError
 from .modes import Complex
 from .polynomials import Array
 

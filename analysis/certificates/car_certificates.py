@@ -11,16 +11,16 @@ from flint import fmpq
 from fmu_src.quantities import ParameterError
 from fmu_src.vehicle.parameters import Car
 
-from .bertolino_baksa.balls import ExactSystem, NotProvedError, precision
-from .bertolino_baksa.certificate import Certificate, certify
-from .bertolino_baksa.norms import Norm, modal_metric, proved_metric
-from .bertolino_baksa.proof import Proof, prove
-from .bertolino_baksa.taylor import find_pieces
-from .car import car_form
-from .errors import InputError
+from ..bertolino_baksa.balls import ExactSystem, NotProvedError, precision
+from ..bertolino_baksa.certificate import Certificate, certify
+from ..bertolino_baksa.norms import Norm, modal_metric, proved_metric
+from ..bertolino_baksa.proof import Proof, prove
+from ..bertolino_baksa.taylor import find_pieces
+from ..car import car_form
+from ..errors import InputError
+from ..methods.polynomials import Array
+from ..reference import Parameters, car_of, road_parameters
 from .exact_car import energy_norm, exact_system, norms
-from .polynomials import Array
-from .reference import Parameters, car_of, road_parameters
 
 AFTER_REST = (7.0, 14.0)  # the pieces last so many times 1/α beyond the last corner if the road then is flat,
 AFTER_PERIODIC = (13.0, 18.0, 23.0)  # and so many if it goes on: what is left of the start is as small as exp(−13) …

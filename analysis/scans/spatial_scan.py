@@ -13,19 +13,19 @@ import numpy as np
 from fmu_src.quantities import STATES
 from fmu_src.vehicle.parameters import Car
 
-from .car import car_form
+from ..car import car_form
+from ..energy import kinetic_energy
+from ..errors import InputError
+from ..files import write_whole
+from ..methods.linear_response import linear_response
+from ..methods.nonlinear_response import nonlinear_response
+from ..methods.polynomials import Array
+from ..methods.spatial import Transfer, UndampedModes, transfer, undamped_modes
+from ..parallel import mapped
+from ..reference import Parameters, car_of
+from ..scenario import read_scenario
 from .car_scans import VARIATIONS, system_of, variation
-from .energy import kinetic_energy
-from .errors import InputError
-from .files import write_whole
-from .linear_response import linear_response
-from .nonlinear_response import nonlinear_response
-from .parallel import mapped
-from .polynomials import Array
-from .reference import Parameters, car_of
 from .resonance_scan import as_csv, output_folder
-from .scenario import read_scenario
-from .spatial import Transfer, UndampedModes, transfer, undamped_modes
 
 SPAN, SAMPLES = 5.0, 501  # s from rest, and times in it
 RTOL = 1e-9  # of the full equations; Φ's share is seen down to about this

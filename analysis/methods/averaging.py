@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from .errors import InputError
+from ..errors import InputError
 from .modal_polynomials import Indices, Waves, all_monomials, exponents, linear_map, modal_parts, substituted, waves
 from .modes import Complex, Modes, modes
 from .polynomials import Array, Homogeneous

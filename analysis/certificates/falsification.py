@@ -14,11 +14,11 @@ from typing import Any
 import numpy as np
 from flint import fmpq
 
-from .bertolino_baksa.balls import Array, ExactSystem, Inputs, NotProvedError, decimal, precision
-from .bertolino_baksa.cells import EPS, errors
-from .bertolino_baksa.norms import Metric, Norm, proved_metric
-from .bertolino_baksa.taylor import find_pieces
-from .bertolino_baksa.tube import Tube, prove_tube
+from ..bertolino_baksa.balls import Array, ExactSystem, Inputs, NotProvedError, decimal, precision
+from ..bertolino_baksa.cells import EPS, errors
+from ..bertolino_baksa.norms import Metric, Norm, proved_metric
+from ..bertolino_baksa.taylor import find_pieces
+from ..bertolino_baksa.tube import Tube, prove_tube
 
 
 @dataclass(frozen=True, slots=True)
