@@ -16,6 +16,7 @@ import pytest
 from conftest import ROOT
 from fmpy import read_model_description
 from fmpy.validation import validate_fmu
+from foreign_runs import call
 
 import build
 from analysis.scenario import read_scenario
@@ -79,8 +80,7 @@ def test_fmpys_own_command_line_simulates_it(
 ) -> None:
     out = tmp_path / "out.csv"
     command = [bare_environment / "fmpy", "simulate", dist / f"{model}.fmu", "--output-file", out]
-    done = subprocess.run(list(map(str, command)), cwd=tmp_path, capture_output=True, text=True, timeout=120)
-    assert done.returncode == 0, done.stdout + done.stderr
+    call(*command, cwd=tmp_path, fragile=True)
     with out.open(newline="") as file:
         rows = list(csv.DictReader(file))
     assert float(rows[-1]["time"]) == pytest.approx(5.0)

@@ -186,5 +186,6 @@ int main(int count, char **arguments) {
     }
     python_says(getenv("PYTHON_SAYS"));
     finish(&plan);
-    return fclose(result) ? 1 : 0;
+    /* not by exit: PythonFMU's library can abort a process in its exit handlers (README, Limits) */
+    _Exit(fclose(result) ? 1 : 0);
 }

@@ -110,5 +110,6 @@ int main(int count, char **arguments) {
     }
     cosim_execution_destroy(execution);
     cosim_observer_destroy(observer);
-    return fclose(result) ? 1 : 0;
+    /* not by exit: PythonFMU's library can abort a process in its exit handlers (README, Limits) */
+    _Exit(fclose(result) ? 1 : 0);
 }
