@@ -9,21 +9,18 @@ import mpmath
 import numpy as np
 import pytest
 from orders import observed_order
-from scipy.integrate import quad_vec, solve_ivp
+from scipy.integrate import solve_ivp
 
-from analysis.car import car_form, road_signal, without_cubic_stiffness
-from analysis.errors import InputError
-from analysis.methods.exponentials import Exponentials, forced_modes, time_scales
+from analysis.car import car_form, road_signal
 from analysis.methods.modes import modes
 from analysis.methods.sampled_series import sampled_series
-from analysis.methods.series import Series, common_rates, exact_series, partial_sums, successive_ratios
+from analysis.methods.series import Series, exact_series, partial_sums, successive_ratios
 from analysis.methods.signals import Piece, Signal, harmonic
-from analysis.methods.standard_form import StandardForm, only, perturbed, standard_form
+from analysis.methods.standard_form import StandardForm, perturbed, standard_form
 from fmu_src.road.profiles import RoadParameters
 from fmu_src.vehicle.parameters import Car
 
 NO_INPUT = Signal((Piece(0.0, np.zeros(0, complex), np.zeros((0, 0), complex)),))
-UNITY = np.eye(14, dtype=complex)
 
 
 # ---------------------------------------------------------------------------------------------------- textbook systems
@@ -91,74 +88,6 @@ def names(found: Series, order: int) -> set[str]:
 
 
 # ---------------------------------------------------------------------------------------------------- the algebra
-def test_functions_add_multiply_and_map_like_arrays_of_their_values(rng: np.random.Generator) -> None:
-    rates = rng.normal(size=4) * 0.3 + 1j * rng.normal(size=4)
-
-    def random(terms: int) -> Exponentials:
-        multiples = rng.integers([0, -2, -2, -2, -2], 3, (terms, 5))
-        values = rng.normal(size=(terms, 3)) + 1j * rng.normal(size=(terms, 3))
-        none = Exponentials(rates, multiples[:0], values[:0])
-        return sum((Exponentials(rates, m[None], c[None]) for m, c in zip(multiples, values, strict=True)), none)
-
-    f, g, s = random(40), random(7), np.linspace(0.0, 2.0, 9)
-    matrix = rng.normal(size=(2, 3))
-    np.testing.assert_allclose((f + g)(s), f(s) + g(s), rtol=1e-12)
-    np.testing.assert_allclose((f * g)(s), f(s) * g(s), rtol=1e-10, atol=1e-10 * np.abs(f(s) * g(s)).max())
-    np.testing.assert_allclose((matrix @ f)(s), matrix @ f(s), rtol=1e-12, atol=1e-12 * np.abs(f(s)).max())
-    np.testing.assert_array_equal(f[[2, 0]](s), f(s)[[2, 0]])
-    assert not len((f + (-UNITY[:3, :3]) @ f).multiples)  # equal sums are one term, and zeros none
-
-
-def test_more_exponents_than_can_be_numbered_are_refused() -> None:
-    f = Exponentials(np.ones(20, complex), np.diag([9] * 20 + [0])[:, :21], np.ones((21, 1), complex))
-    with pytest.raises(InputError, match="lower order"):
-        f * f
-
-
-def test_a_forced_mode_is_its_duhamel_integral(rng: np.random.Generator) -> None:
-    rates = np.array([-0.3 + 2.0j, -0.3 - 2.0j, 1.7j])
-    multiples = np.array([[2, 1, 0, 0], [0, 1, 0, 0], [0, 2, 1, 0], [1, 0, 0, -1], [3, 0, 0, 1], [0, 0, 0, 0]])
-    f = Exponentials(rates, multiples, rng.normal(size=(6, 2)) + 1j * rng.normal(size=(6, 2)))
-    start = np.array([0.4 - 0.1j, 1.0 + 2.0j])
-    xi, resonances = forced_modes(f, start)
-    for s in (0.0, 0.7, 5.0):
-        integral, _ = quad_vec(lambda u, s=s: np.exp(rates[:2] * (s - u)) * f(np.array([u]))[:, 0], 0.0, s, 1e-13)
-        np.testing.assert_allclose(xi(np.array([s]))[:, 0], np.exp(rates[:2] * s) * start + integral, rtol=1e-11)
-    assert {(r.mode, r.multiples, r.degree) for r in resonances} == {(0, (1, 0, 0), 0), (0, (1, 0, 0), 2)}
-
-
-def test_a_constant_force_on_a_free_mass_is_a_power_of_time() -> None:
-    """ξ' = s² from 1, λ = 0: no time scale at all."""
-    f = Exponentials(np.zeros(1, complex), np.array([[2, 0]]), np.ones((1, 1), complex))
-    xi, _ = forced_modes(f, np.ones(1, complex))
-    np.testing.assert_allclose(xi(np.array([0.0, 3.0]))[0], [1.0, 10.0])
-
-
-@pytest.mark.parametrize("eigenvalue", [-2.0 + 7.0j, -0.01 + 3.0j, 3.0j, 0.2 + 1.0j], ids=str)
-@pytest.mark.parametrize("degree", [0, 2])
-def test_near_resonance_loses_no_more_accuracy_than_is_said(eigenvalue: complex, degree: int) -> None:
-    """∫ uʲ exp(δu) du = s^(j+1) M(j+1, j+2, δs)/(j+1), Kummer's function, for δ from round-off to λ itself."""
-    kummer = np.vectorize(lambda z: complex(mpmath.hyp1f1(degree + 1, degree + 2, z)))
-    scale = float(time_scales(np.array([eigenvalue]))[0])
-    for last, allowed in ((3.0 / abs(eigenvalue), 1e-11 if degree == 0 else 1e-5), (10.0 * scale, 1e-9)):
-        s = np.linspace(0.0, last, 13)
-        for distance in 10.0 ** np.arange(-15.0, 0.5, 0.5) * abs(eigenvalue) * np.exp(2.0j):
-            rates = np.array([eigenvalue, eigenvalue + distance])
-            f = Exponentials(rates, np.array([[degree, 0, 1]]), np.ones((1, 1), complex))
-            xi, _ = forced_modes(f, np.zeros(1, complex))
-            integral = s ** (degree + 1) * kummer((rates[1] - rates[0]) * s) / (degree + 1)
-            exact = np.exp(eigenvalue * s) * integral
-            assert np.abs(xi(s)[0] - exact).max() < allowed * np.abs(exact).max(), distance
-
-
-def test_exponents_in_a_rational_ratio_share_a_rate() -> None:
-    exponents = np.array([2j, -2j, 3j, 0.0, -0.5 + 1j * np.sqrt(2.0), 6j])
-    rates, multiples = common_rates(exponents)
-    assert multiples.tolist() == [[2, 0], [-2, 0], [3, 0], [0, 0], [0, 1], [6, 0]]
-    np.testing.assert_allclose(multiples @ rates, exponents, rtol=1e-15)
-
-
-# ---------------------------------------------------------------------------------------------------- closed forms
 def test_duffings_first_correction_is_the_textbooks() -> None:
     """x'' + x + ε x³ = 0 from rest at 1: x⁽¹⁾ = (cos 3t − cos t)/32 − ⅜ t sin t."""
     t = np.linspace(0.0, 40.0, 201)
@@ -323,65 +252,3 @@ def test_successive_terms_say_how_far_the_series_reaches() -> None:
 
 
 # ---------------------------------------------------------------------------------------------------- the car
-TIMES = np.linspace(0.0, 1.0, 201)
-AMPLITUDES = [0.2, 0.15, 0.1]  # m
-CARS = {"default": Car(), "damped tyres": Car(bp1=150.0, bp2=170.0, Jz=700.0)}
-
-
-def whole(car: Car, amplitude: float) -> Any:
-    """The full equations on the bump, integrated tightly."""
-    return integrated(car_form(car), 1.0, road_signal(RoadParameters(A=amplitude)), [0.0] * 14, TIMES)
-
-
-def relative(error: Any, of: Any) -> float:
-    """Largest difference, over each state's maximum."""
-    return float((np.abs(error) / np.abs(of).max(axis=1, keepdims=True)).max())
-
-
-@pytest.mark.parametrize("car", CARS.values(), ids=CARS)
-def test_the_cars_truncation_error_falls_with_amplitude_at_orders_3_5_7_and_9(car: Car) -> None:
-    """Against the full equations; x⁽ᵏ⁾ of a road of 1 m, times A^(2k+1), is that of the amplitude A.
-
-    Terms of degree 3 (cubic stiffness and P among them) carry order 1, of degree 5 order 2, of degree 7 order 3.
-    """
-    form, grid = car_form(car, order=7), np.linspace(0.0, 1.0, 2001)
-    w = road_signal(RoadParameters(A=1.0))
-    terms = sampled_series(form, modes(form.A), w, grid, np.zeros(14), 3).physical(TIMES)
-    exact = {A: whole(car, A) for A in AMPLITUDES}
-    for order in range(4):
-
-        def error(A: float, order: int = order) -> float:
-            return A * relative(exact[A] - A * partial_sums(terms, A * A)[order], exact[A])
-
-        slope, bend = observed_order(error, AMPLITUDES)
-        assert slope == pytest.approx(2 * order + 3, abs=0.1)
-        assert bend < 0.02
-
-
-def test_exact_sums_and_quadrature_are_two_ways_to_the_same_terms() -> None:
-    """Up to order 2, from a start off rest, with pieces of 1 ms, on which the sums nearly cancel."""
-    form = car_form(CARS["damped tyres"])
-    w, linear = road_signal(RoadParameters(tau0=0.001, excited=(True, True, False, False))), modes(form.A)
-    x0, grid = np.linspace(-0.01, 0.01, 14), np.linspace(0.0, 0.5, 1001)
-    exact = exact_series(form, linear, w, x0, 2).physical(TIMES[:101])
-    found = sampled_series(form, linear, w, grid, x0, 2).physical(TIMES[:101])
-    for k, tolerance in enumerate([1e-11, 1e-9, 1e-9]):
-        np.testing.assert_allclose(found[k], exact[k], atol=tolerance * np.abs(exact[k]).max())
-
-
-@pytest.mark.parametrize(
-    ("left_out", "least", "most"), [("nothing", 100.0, 200.0), ("P", 2.0, 20.0), ("cubic stiffness", 0.9, 1.1)]
-)
-def test_what_the_first_correction_gains(left_out: str, least: float, most: float) -> None:
-    """The paper's own R̄ lacks c_ijkl q q q and gains nothing; without P a part of the gain is lost."""
-    car, A = Car(), 0.1
-    form = car_form(car)
-    kept = {
-        "nothing": form,
-        "P": only(form, lambda monomial: max(monomial) < 14),
-        "cubic stiffness": without_cubic_stiffness(form),
-    }[left_out]
-    terms = exact_series(kept, modes(form.A), road_signal(RoadParameters(A=A)), np.zeros(14), 1).physical(TIMES)
-    exact = whole(car, A)
-    errors = [relative(exact - sums, exact) for sums in partial_sums(terms)]
-    assert least < errors[0] / errors[1] < most
