@@ -45,5 +45,5 @@ def test_control_is_certified_in_the_passive_norms() -> None:
         off *= delta / claim.norm(off)
         assert excursions(form, signal, [claim.norm], np.zeros(14), off, 1.0, 1e-3).max() < epsilon
     energy = closed.claims[0]
-    assert energy.largest_delta > 1.2 * passive.claims[0].largest_delta
+    assert energy.largest_delta > 1.08 * passive.claims[0].largest_delta  # both to CLOSE
     assert len(comparison(passive, closed)) == 3

@@ -78,18 +78,23 @@ class Decay:
 
 
 def decay(metric: Metric, pieces: tuple[Piece, ...]) -> Decay:
-    """e^(At) over the cells of the pieces, from the first piece's begin."""
-    A, start = metric.A, pieces[0].begin
-    ends, off = [np.eye(A.nrows())], 0.0
-    A_size = np.abs(rounded(A)[0])
-    cells = counts(pieces, metric)
-    for p, count in zip(pieces, cells, strict=True):
-        now, over = (A * arb(p.begin - start)).exp(), (A * (arb(p.duration) / count)).exp()
+    """e^(At) over the cells of the pieces, from the first piece's begin.
+
+    From piece to piece without the radii of the balls, which would grow: what they hold, e^(At) only shrinks in ‖·‖_S.
+    """
+    A = metric.A
+    now, ends, off, dropped = matrix(np.eye(A.nrows())), [np.eye(A.nrows())], 0.0, 0.0
+    A_size, S_size = np.abs(rounded(A)[0]), float(np.linalg.norm(metric.S)) * (1 + EPS)
+    for p, count in zip(pieces, counts(pieces, metric), strict=True):
+        over = (A * (arb(p.duration) / count)).exp()
         for _ in range(count):
-            now = now * over
+            now = over * now
             centre, rest = rounded(now)
             ends.append(centre)
             off = max(off, rest)
+        dropped += S_size * above(sum((v.rad() for v in now.entries()), arb(0)))
+        now = now.mid()
+    off += float(np.linalg.norm(metric.reach)) * dropped * (1 + 1e-9)
     values, width = np.array(ends), widths(pieces, metric)
     distinct, where = np.unique(width, return_inverse=True)
     spread = np.array([expm(A_size * w * (1 + EPS)) for w in distinct])[where]  # ≥ |e^(As)|, 0 ≤ s ≤ Δ
@@ -141,16 +146,17 @@ def errors(tube: Tube, metric: Metric, norm: Norm) -> Array:
     return np.concatenate(found) * (1 + EPS)
 
 
-def _sampled(coefficients: Array, cells: int, sizes: Array | None = None) -> tuple[Array, Array]:
+def _sampled(coefficients: Array, cells: int, sizes: Array | None = None, begin: float = 0.0) -> tuple[Array, Array]:
     """Values (n, cells + 1) of polynomials at the cells' ends, and by how much (n,) they may leave the chords between.
 
+    The cells divide what lies between `begin` (0 or −1) and 1.
     sizes : of the coefficients before they were combined, for the rounding of the combination.
     """
     k = np.arange(coefficients.shape[1])
-    powers = np.linspace(0.0, 1.0, cells + 1)[None, :] ** k[:, None]
+    powers = np.linspace(begin, 1.0, cells + 1)[None, :] ** k[:, None]
     sizes = np.abs(coefficients) if sizes is None else sizes
     second = (sizes * k * (k - 1)).sum(axis=1)
-    return coefficients @ powers, second / (8.0 * cells**2) + EPS * sizes.sum(axis=1)
+    return coefficients @ powers, second * (1.0 - begin) ** 2 / (8.0 * cells**2) + EPS * sizes.sum(axis=1)
 
 
 def errors_of_states(tube: Tube, metric: Metric) -> Array:
@@ -167,7 +173,7 @@ def outputs(system: ExactSystem, tube: Tube, metric: Metric, functions: Outputs)
     low, high = [], []
     for piece, V in zip(tube.pieces, tube.full, strict=True):
         centres, rest = enclosed_series(system, piece, functions, metric.reach * V)
-        values, bend = _sampled(centres, FINE)
+        values, bend = _sampled(centres, FINE, begin=-1.0)
         low.append((values - bend[:, None]).min(axis=1) - rest)
         high.append((values + bend[:, None]).max(axis=1) + rest)
     return np.min(low, axis=0), np.max(high, axis=0)

@@ -27,7 +27,7 @@ FORMAT = 1
 ROWS = 24  # of a table δ(ε)
 FIRST = 1e-3  # of the floor: what the smallest δ may add to it
 FLOOR = 1e-6  # of the motion: a smaller floor is not told from none
-CLOSE = 0.8  # of the first δ that failed: near enough for a largest δ
+CLOSE = 0.95  # of a δ that failed: near enough for a largest δ
 MARGIN = 1e-6  # relative, by which claims stand off what was proved
 MAX_BYTES = 200_000_000
 THEOREM = (
@@ -91,9 +91,10 @@ def certify(
             pieces = tuple(find_pieces(system, x0.tolist(), stop))
             proof = prove(system, proved_metric(system, S), pieces, x0.tolist())
             x_lin = np.concatenate([values(p.linear) for p in pieces], axis=1)
-            if all(proof.settled(norm) for norm in norms(x_lin)):
+            floors = [(norm, float(proof.epsilon(norm, np.zeros(1))[0])) for norm in norms(x_lin)]
+            if all(proof.settled(norm, floor) for norm, floor in floors):
                 break
-        claims = tuple(_claim(proof, norm, float(norm(x_lin).max())) for norm in norms(x_lin))
+        claims = tuple(_claim(proof, norm, floor, float(norm(x_lin).max())) for norm, floor in floors)
     return Certificate(model, x0, S, pieces, claims), proof
 
 
@@ -102,32 +103,48 @@ def values(coefficients: Array, points: int = 9) -> Array:
     return coefficients @ np.linspace(0.0, 1.0, points) ** np.arange(coefficients.shape[1])[:, None]
 
 
-def _claim(proof: Proof, norm: Norm, scale: float) -> Claim:
+def _claim(proof: Proof, norm: Norm, floor: float, scale: float) -> Claim:
     """The table with the largest δ that is found; its smallest δ raises the floor by but FIRST of it.
 
+    floor : what is proved of δ = 0.
     scale : N of the largest motion of x_lin, or 1 where that rests; a floor of 0 becomes FLOOR of it, as l > 0.
     """
     scale = scale or 1.0
-    floor = max(float(proof.epsilon(norm, np.array([0.0]))[0]), FLOOR * scale)
+    floor = max(floor, FLOOR * scale)
     if not floor < np.inf:
         raise NotProvedError(f"no bound for all t in the {norm.name} norm")
     first = FIRST * floor / float(proof.decay.of(norm).max())
-    top = max(16.0 * scale, 2.0 * first)
-    while top > first:
-        delta = np.sort(np.append(np.geomspace(first, top, ROWS), CLOSE * top))
+    top = _largest(proof, norm, first, scale)
+    while True:  # once more: the bounds depend on the largest δ
+        delta = np.geomspace(first, top, ROWS) * (1.0 - MARGIN)
         epsilon = _epsilon(proof, norm, delta)
-        proved = int(np.argmin(np.append(np.isfinite(epsilon), False)))
-        if proved == len(delta) or (proved and delta[proved - 1] >= CLOSE * top):
+        if np.all(np.isfinite(epsilon)):
             break
-        top = delta[proved] if proved else top / 16.0
-    else:
-        raise NotProvedError(f"no delta > 0 in the {norm.name} norm")
-    delta = delta[:proved] * (1.0 - MARGIN)
-    epsilon = _epsilon(proof, norm, delta)  # once more: the bounds depend on the largest δ
-    while not np.all(np.isfinite(epsilon)):
-        delta = delta[:-1]
-        epsilon = _epsilon(proof, norm, delta)
+        if not top > first:
+            raise NotProvedError(f"no delta > 0 in the {norm.name} norm")
+        top = max(CLOSE * top, first)
     return Claim(norm, np.stack([np.maximum.accumulate(epsilon) * (1.0 + MARGIN), delta], axis=1))
+
+
+def _largest(proof: Proof, norm: Norm, first: float, scale: float) -> float:
+    """The largest δ ≥ first found to be proved: the last of ROWS of them, then of as many up to the next."""
+    top = max(16.0 * scale, 2.0 * first)
+    while True:
+        delta = np.geomspace(first, top, ROWS)
+        if proved := _proved(proof, norm, delta):
+            break
+        if not top > 2.0 * first:
+            raise NotProvedError(f"no delta > 0 in the {norm.name} norm")
+        top = max(top / 16.0, 2.0 * first)
+    if proved < ROWS:
+        delta = np.geomspace(delta[proved - 1], delta[proved], ROWS)
+        proved = max(_proved(proof, norm, delta), 1)
+    return float(delta[proved - 1])
+
+
+def _proved(proof: Proof, norm: Norm, delta: Array) -> int:
+    """How many of these rising δ are proved before the first that is not."""
+    return int(np.argmin(np.append(np.isfinite(_epsilon(proof, norm, delta)), False)))
 
 
 def _epsilon(proof: Proof, norm: Norm, delta: Array) -> Array:

@@ -6,6 +6,7 @@ bounds e; y is e^(At) y(0), exactly, and a rest that `growth` bounds. What comes
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -17,7 +18,7 @@ from .cells import Decay, decay, errors, inputs, ranges
 from .growth import perturbed
 from .majorant import Majorant, majorant
 from .norms import Metric, Norm
-from .tube import Piece, Tube, both, jumps, prove_tube
+from .tube import Off, Piece, Tube, both, followed, jumps, prove_tube
 
 SETTLED = 1e-3
 ROOM = 1.5  # of the box on which the equations are bounded, over the largest motion
@@ -64,9 +65,8 @@ class Proof:
         later = self._later(norm, bound, self.decay.at_end(self.metric, norm) * delta + end)
         return np.maximum(on_pieces.max(axis=0), later) * (1.0 + 1e-9)
 
-    def settled(self, norm: Norm) -> bool:
-        """Whether longer pieces would lower the floor by less than SETTLED of it: the tail has no part in it."""
-        floor = float(self.epsilon(norm, np.zeros(1))[0])
+    def settled(self, norm: Norm, floor: float) -> bool:
+        """Whether longer pieces would lower this floor by less than SETTLED of it: the tail has no part in it."""
         return floor <= (1.0 + SETTLED) * float(errors(self.tube, self.metric, norm).max())
 
     def majorant(self, spread: Array) -> Majorant:
@@ -101,8 +101,8 @@ class Proof:
         last = self.tube.pieces[-1]
         x = self.metric.length(column([sum(row, arb(0)) for row in both(last)]))
         e = self.metric.length(column([sum((arb(v) for v in row), arb(0)) for row in last.error.tolist()]))
-        V_lin, V = self.tube.at_end
-        return (x + V) * (1.0 + 1e-15), (e + V + V_lin) * (1.0 + 1e-15)
+        _, V, V_e = self.tube.at_end
+        return (x + V) * (1.0 + 1e-15), (e + V_e) * (1.0 + 1e-15)
 
 
 def prove(system: ExactSystem, metric: Metric, pieces: Sequence[Piece], x0: Sequence[float]) -> Proof:
@@ -123,15 +123,22 @@ def prove(system: ExactSystem, metric: Metric, pieces: Sequence[Piece], x0: Sequ
 def _repetition(system: ExactSystem, metric: Metric, tube: Tube) -> Repetition:
     """The last period's pieces, with a V that comes back no larger than it began."""
     first = _window(system, tube.pieces)
-    pieces = tube.pieces[first:]
+    pieces, defects = tube.pieces[first:], tube.defects[first:]
     begin = pieces[0].linear[:, 0], pieces[0].error[:, 0]
     jump = jumps(metric, (pieces[-1].linear, pieces[-1].error), pieces[0])
-    once = prove_tube(system, metric, pieces, begin, jump)
+
+    def around(off: Off) -> Tube:
+        return followed(system, metric, pieces, defects, begin, off)
+
+    once = around(jump)
     shrink = above(arb(sum(float(g) * float(p.duration) for g, p in zip(once.growth, pieces, strict=True))).exp())
     if not shrink < 1.0:
         raise NotProvedError(f"over a period differences grow by {shrink:g}; wanted < 1")
-    off = [1.1 * (j + v) / (1.0 - shrink) + t for j, v, t in zip(jump, once.at_end, tube.at_end, strict=True)]
-    window = prove_tube(system, metric, pieces, begin, (off[0], off[1]))
+    lin, full, _ = (1.1 * (j + v) / (1.0 - shrink) + t for j, v, t in zip(jump, once.at_end, tube.at_end, strict=True))
+    gained = around((lin, full, 0.0)).at_end[2]  # by e, which shrinks as the linear part does
+    once_linear = math.exp(-metric.alpha * float(pieces[-1].end - pieces[0].begin))
+    off = lin, full, 1.1 * (jump[2] + gained) / (1.0 - once_linear) + tube.at_end[2]
+    window = around(off)
     returned = [max(v, t) + j for v, t, j in zip(window.at_end, tube.at_end, jump, strict=True)]
     if not all(v * (1.0 + 1e-15) <= o for v, o in zip(returned, off, strict=True)):
         raise NotProvedError("the tube of one period does not come back into itself")

@@ -12,7 +12,7 @@ from .balls import ExactSystem, NotProvedError, coefficients, column, cosine, ja
 from .tube import Piece
 
 DEGREE = 30
-LAST_TERM = 1e-14  # of a polynomial, over the size of the motion: it sets the length of a piece
+LAST_TERM = 1e-13  # of a polynomial, over the size of the motion: it sets the length of a piece
 LONGEST, SHORTEST = 0.25, 1e-5  # s
 
 

@@ -1,11 +1,13 @@
 """The validated reference: polynomials near x_lin and near e = x − x_lin, and a proved tube around them.
 
-Both x_lin and the motion x of the full equations, with the same x(0), run within V of their polynomials in metric S:
+Both x_lin and the motion x of the full equations run within V of their polynomials in metric S, and e = x − x_lin
+within V_e of the difference of these:
 
-    V' ≤ (−α + L) V + ‖defect‖_S        L: bound of ‖∂F/∂x − A‖_S on the tube
+    V'  ≤ (−α + L) V + ‖defect‖_S            L: bound of ‖∂F/∂x − A‖_S on the tube
+    V_e' ≤ −α V_e + L V + ‖both defects‖_S
 
-for x, and the same without L for x_lin. Polynomials need not fit together: a jump between pieces adds to V. How they
-were found does not matter to the proof (`taylor.py` finds them).
+for x and e, and the first without L for x_lin. Polynomials need not fit together: a jump between pieces adds to V. How
+they were found does not matter to the proof (`taylor.py` finds them).
 """
 
 from __future__ import annotations
@@ -17,11 +19,24 @@ from typing import Any
 import numpy as np
 from flint import arb, arb_mat, arb_poly, arb_series, fmpq
 
-from .balls import Array, ExactSystem, NotProvedError, above, coefficients, column, cosine, jacobian, precision, sine
+from .balls import (
+    Array,
+    Balls,
+    ExactSystem,
+    NotProvedError,
+    above,
+    coefficients,
+    column,
+    cosine,
+    jacobian,
+    precision,
+    sine,
+)
 from .norms import Metric
 
 Outputs = Callable[[Sequence[Any], Sequence[Any], Any, Any], Sequence[Any]]
-MORE = 8  # terms of a defect's series beyond the polynomials' degree; what is left is enclosed
+MIDDLE, WHOLE = arb(0.5), arb(0.5, 0.5)  # of a piece, as τ
+MORE = 4  # terms of a defect's series beyond the polynomials' degree; what is left is enclosed
 TRIES = 60  # of a wider tube, before a piece is given up
 
 
@@ -40,20 +55,21 @@ class Piece:
         return self.end - self.begin
 
 
+Off = tuple[float, float, float]
+"""Bounds [‖·‖_S] for x_lin, x and e."""
+
+
 @dataclass(frozen=True, slots=True)
 class Tube:
-    """What is proved: on each piece x_lin and x are within `linear` and `full` [‖·‖_S] of their polynomials."""
+    """What is proved: on each piece x_lin, x, e are within `linear`, `full`, `error` [‖·‖_S] of their polynomials."""
 
     pieces: tuple[Piece, ...]
+    defects: Array  # (pieces, 2) of x_lin's and of x's polynomials [1/s]
     linear: Array  # (pieces,)
     full: Array  # (pieces,)
-    at_end: tuple[float, float]  # both at the end of the last piece
+    error: Array  # (pieces,)
+    at_end: Off  # of the last piece
     growth: Array  # (pieces,) −α + L [1/s]
-
-    @property
-    def error(self) -> Array:
-        """Bound of ‖e − its polynomial‖_S on each piece."""
-        return (self.linear + self.full) * (1.0 + 1e-15)
 
 
 def prove_tube(
@@ -68,22 +84,30 @@ def prove_tube(
     Raises NotProvedError where the pieces leave a gap or the tube cannot be closed.
     """
     B = input_matrix(system)
-    V_lin, V = off
+    defects = [(_linear_defect(system, metric, B, p), _defect(system, metric, p)) for p in pieces]
+    return followed(system, metric, pieces, np.array(defects), start, (*off, off[0] + off[1]))
+
+
+def followed(
+    system: ExactSystem, metric: Metric, pieces: Sequence[Piece], defects: Array, start: tuple[Array, Array], off: Off
+) -> Tube:
+    """The tube around pieces with these defects (pieces, 2), as of `prove_tube`; it raises the same."""
+    V_lin, V, V_e = off
     before = start[0][:, None], start[1][:, None]
-    linear, full, rates = [], [], []
-    for k, piece in enumerate(pieces):
+    widths, rates = [], []
+    for k, (piece, (d_lin, d)) in enumerate(zip(pieces, defects.tolist(), strict=True)):
         if k and piece.begin != pieces[k - 1].end:
             raise NotProvedError(f"pieces {k - 1} and {k} do not follow each other")
-        jump_lin, jump = jumps(metric, before, piece)
-        V_lin, V = V_lin + jump_lin, V + jump
-        after, growth = _closed(system, metric, piece, V, _defect(system, metric, piece))
-        after_lin = _grown(V_lin, -metric.alpha, _linear_defect(system, metric, B, piece), piece)
-        linear.append(max(V_lin, after_lin))
-        full.append(max(V, after))
-        rates.append(growth)
-        V_lin, V = after_lin, after
+        V_lin, V, V_e = (v + jump for v, jump in zip((V_lin, V, V_e), jumps(metric, before, piece), strict=True))
+        after, L = _closed(system, metric, piece, V, d)
+        after_lin, full = _grown(V_lin, -metric.alpha, d_lin, piece), max(V, after)
+        after_e = _grown(V_e, -metric.alpha, (L * full + d_lin + d) * (1.0 + 1e-15), piece)
+        widths.append((max(V_lin, after_lin), full, max(V_e, after_e)))
+        rates.append(L - metric.alpha)
+        V_lin, V, V_e = after_lin, after, after_e
         before = piece.linear, piece.error
-    return Tube(tuple(pieces), np.array(linear), np.array(full), (V_lin, V), np.array(rates))
+    linear, fulls, errors = np.array(widths).T
+    return Tube(tuple(pieces), defects, linear, fulls, errors, (V_lin, V, V_e), np.array(rates))
 
 
 def prove_linear(system: ExactSystem, metric: Metric, pieces: Sequence[Piece]) -> Array:
@@ -109,12 +133,12 @@ def both(piece: Piece) -> list[list[Any]]:
     return [[arb(a) + arb(b) for a, b in zip(lin, rest, strict=True)] for lin, rest in rows]
 
 
-def jumps(metric: Metric, before: tuple[Array, Array], piece: Piece) -> tuple[float, float]:
-    """‖·‖_S of the jumps of the polynomials of x_lin and of x at the piece's begin."""
+def jumps(metric: Metric, before: tuple[Array, Array], piece: Piece) -> Off:
+    """‖·‖_S of the jumps of the polynomials of x_lin, x and e at the piece's begin."""
     old = [[sum((arb(v) for v in row), arb(0)) for row in c.tolist()] for c in before]
     new = [[arb(v) for v in c[:, 0].tolist()] for c in (piece.linear, piece.error)]
-    linear = column(new[0]) - column(old[0])
-    return metric.length(linear), metric.length(linear + column(new[1]) - column(old[1]))
+    linear, error = (column(n) - column(o) for n, o in zip(new, old, strict=True))
+    return metric.length(linear), metric.length(linear + error), metric.length(error)
 
 
 def _grown(V: float, rate: float, defect: float, piece: Piece) -> float:
@@ -125,10 +149,22 @@ def _grown(V: float, rate: float, defect: float, piece: Piece) -> float:
     return above(factor * V + integral * defect)
 
 
+def exact(polynomials: Array) -> list[list[Any]]:
+    """Coefficients as balls."""
+    return [[arb(v) for v in row] for row in polynomials.tolist()]
+
+
+def _centred(p: Sequence[Balls], centre: Any, terms: int) -> list[list[Any]]:
+    """So many coefficients of polynomials in τ by powers of σ = 2 (τ − centre)."""
+    moved = arb_poly([centre, arb(1) / 2])
+    rows = [arb_poly(c)(moved).coeffs() for c in p]
+    return [[*row, *[arb(0)] * (terms - len(row))] for row in rows]
+
+
 def _inputs(system: ExactSystem, piece: Piece, centre: Any, terms: int) -> list[list[Any]]:
-    """Coefficients of w(τ) at the centre, a ball in 0 ≤ τ ≤ 1."""
+    """So many coefficients of w by powers of σ = 2 (τ − centre), the centre a ball in 0 ≤ τ ≤ 1."""
     h = arb(piece.duration)
-    w = system.inputs_at(piece.begin)(arb_series([arb(piece.begin) + h * centre, h], prec=terms))
+    w = system.inputs_at(piece.begin)(arb_series([arb(piece.begin) + h * centre, h / 2], prec=terms))
     return [coefficients(wi, terms) for wi in w]
 
 
@@ -136,15 +172,14 @@ def _linear_defect(system: ExactSystem, metric: Metric, B: arb_mat, piece: Piece
     """sup ‖A p + B w − p'‖_S [1/s]; beyond the polynomial's degree there is only w, whose last term is a remainder."""
     terms = piece.linear.shape[1] + MORE
     with precision(terms):
-        w = _inputs(system, piece, arb(0), terms)
-        last = [at[-1] for at in _inputs(system, piece, arb(0.5, 0.5), terms)]
+        w = _inputs(system, piece, MIDDLE, terms)
+        last = [at[-1] for at in _inputs(system, piece, WHOLE, terms)]
+        p = _centred(exact(piece.linear), MIDDLE, terms)
     for wi, remainder in zip(w, last, strict=True):
         wi[-1] = remainder
-    zeros = [arb(0)] * MORE
-    p = [[arb(v) for v in row] + zeros for row in piece.linear.tolist()]
-    slope = [[row[k + 1] * (k + 1) for k in range(terms - 1)] + [arb(0)] for row in p]
-    defect = metric.A * arb_mat(p) + B * arb_mat(w) - arb_mat(slope) / arb(piece.duration)
-    return _sup_length(metric, [defect[i, k] for i in range(system.n) for k in range(terms)], terms)
+    slope = [[*(row[k] * k for k in range(1, terms)), arb(0)] for row in p]
+    defect = metric.A * arb_mat(p) + B * arb_mat(w) - arb_mat(slope) * (2 / arb(piece.duration))
+    return _sup_length(metric, defect.entries(), terms)
 
 
 def _defect(system: ExactSystem, metric: Metric, piece: Piece) -> float:
@@ -152,27 +187,30 @@ def _defect(system: ExactSystem, metric: Metric, piece: Piece) -> float:
     h = arb(piece.duration)
 
     def defect(y: Sequence[Any], w: Sequence[Any], sin: Any, cos: Any) -> list[Any]:
-        return [rate - yi.derivative() / h for rate, yi in zip(system.equations(y, w, sin, cos), y, strict=True)]
+        return [rate - yi.derivative() * 2 / h for rate, yi in zip(system.equations(y, w, sin, cos), y, strict=True)]
 
     rows = _series(system, piece, defect, both(piece))
     return _sup_length(metric, [c for row in rows for c in row], len(rows[0]))
 
 
-def _series(system: ExactSystem, piece: Piece, functions: Outputs, p: list[list[Any]]) -> list[list[Any]]:
-    """Coefficients of functions(p(τ), w(τ), sin, cos): all but the last at τ = 0, the last over the whole piece."""
+def _series(system: ExactSystem, piece: Piece, functions: Outputs, p: Sequence[Balls]) -> list[list[Any]]:
+    """Coefficients of σᵏ, σ = 2τ − 1, of functions(p, w, sin, cos): the last over the whole piece, others at σ = 0.
+
+    Around the middle, as there a remainder of order k weighs 2⁻ᵏ of what it does from an end on.
+    """
     terms = piece.linear.shape[1] + MORE
     found: list[list[list[Any]]] = []
     with precision(terms + 1):
-        for centre in (arb(0), arb(0.5, 0.5)):
-            shift = arb_poly([centre, 1])
-            y = [arb_series(arb_poly(c)(shift).coeffs() or [0], prec=terms + 1) for c in p]
+        for centre in (MIDDLE, WHOLE):
+            y = [arb_series(c, prec=terms + 1) for c in _centred(p, centre, terms + 1)]
             w = [arb_series(c, prec=terms + 1) for c in _inputs(system, piece, centre, terms + 1)]
             found.append([coefficients(value, terms) for value in functions(y, w, sine, cosine)])
     return [[*at[:-1], over[-1]] for at, over in zip(*found, strict=True)]
 
 
 def enclosed_series(system: ExactSystem, piece: Piece, functions: Outputs, off: Array) -> tuple[Array, Array]:
-    """Outputs along all x with |x_j − p_j| ≤ off_j: coefficients (k, terms) of τᵏ, and how far (k,) they may be off."""
+    """Outputs along all x with |x_j − p_j| ≤ off_j: coefficients (k, terms) of (2τ − 1)ᵏ, and how far (k,) they may be
+    off."""
     p = both(piece)
     for row, radius in zip(p, off.tolist(), strict=True):
         row[0] = row[0] + arb(0, radius)
@@ -186,25 +224,24 @@ def enclosed_series(system: ExactSystem, piece: Piece, functions: Outputs, off: 
 
 
 def _sup_length(metric: Metric, entries: Sequence[Any], terms: int) -> float:
-    """Bound of ‖Σ d_k τᵏ‖_S over 0 ≤ τ ≤ 1 from the entries, row by row."""
-    sums = np.array([above(c) for c in entries]).reshape(-1, terms).sum(axis=1)
-    return metric.longest(sums * (1.0 + 1e-13))
+    """Bound of ‖Σ d_k σᵏ‖_S over |σ| ≤ 1 from the entries, row by row."""
+    rows = [entries[k : k + terms] for k in range(0, len(entries), terms)]
+    return metric.longest(np.array([above(sum(map(abs, row), arb(0))) for row in rows]))
 
 
 def _closed(system: ExactSystem, metric: Metric, piece: Piece, V: float, defect: float) -> tuple[float, float]:
-    """V at the end, and the growth rate −α + L that holds on a tube wide enough for V to stay in it."""
-    whole = arb(0.5, 0.5)
-    ranges = [arb_poly(c)(whole) for c in both(piece)]
-    w = system.inputs_at(piece.begin)(arb(piece.begin) + arb(piece.duration) * whole)
+    """V at the end, and the L that holds on a tube wide enough for V to stay in it."""
+    ranges = [arb_poly(c)(arb(0, 1)) for c in _centred(both(piece), MIDDLE, 0)]
+    w = system.inputs_at(piece.begin)(arb(piece.begin) + arb(piece.duration) * WHOLE)
     most = 2.0 * (V + defect * above(arb(piece.duration)))
     for _ in range(TRIES):
         box = [r + arb(0, n * most) for r, n in zip(ranges, metric.reach.tolist(), strict=True)]
         try:
-            growth = metric.size(jacobian(system, box, w) - metric.A) - metric.alpha
-            after = _grown(V, growth, defect, piece)
+            L = metric.size(jacobian(system, box, w) - metric.A)
+            after = _grown(V, L - metric.alpha, defect, piece)
         except NotProvedError:  # wider than numbers go
             break
         if max(V, after) <= most:
-            return after, growth
+            return after, L
         most = 2.0 * max(after, most)
     raise NotProvedError(f"the tube cannot be closed from t = {float(piece.begin):g} s on")

@@ -23,7 +23,7 @@ from ..reference import Parameters, car_of, road_parameters
 from .exact_car import energy_norm, exact_system, norms
 
 AFTER_REST = (7.0, 14.0)  # the pieces last so many times 1/α beyond the last corner if the road then is flat,
-AFTER_PERIODIC = (13.0, 18.0, 23.0)  # and so many if it goes on: what is left of the start is as small as exp(−13) …
+AFTER_PERIODIC = (10.0, 12.0, 16.0, 22.0)  # and so many if it goes on: what is left of the start is as small as e^−10 …
 ROUND_OFF = 1e-9  # of the largest eigenvalue: a decay below it is not told from none
 
 
