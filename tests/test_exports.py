@@ -17,7 +17,7 @@ from analysis.car import car_form, road_signal
 from analysis.certificates.exact_car import energy_norm
 from analysis.certificates.exported import _rounding
 from analysis.certificates.run_certificates import _motions, certified_findings
-from analysis.certificates.unknown_roads import AllRoads, FittedRoad, fitted_road, on_all_roads, road_class
+from analysis.certificates.unknown_roads import road_class
 from analysis.cosimulation import simulate
 from analysis.errors import InputError
 from analysis.reference import road_parameters
@@ -133,7 +133,7 @@ def test_rows_and_bound_on_a_class_of_roads(bump: Run, form: str) -> None:
     assert not certified_findings(tampered(bump, halved), roads=road_class("curv:45"))[0][0].holds
 
 
-def everywhere(run: Run, form: str) -> tuple[AllRoads, FittedRoad]:
+def everywhere(run: Run, form: str) -> tuple[object, object]:
     t, heights = run.trajectory.time, run.trajectory.columns([q.name for q in ROAD_HEIGHTS])
     road = fitted_road(t, heights, np.spacing(heights), road_class(form))
     return on_all_roads(_motions(run, t, np.zeros(14), np.zeros(14), road), road), road

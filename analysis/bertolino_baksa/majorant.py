@@ -91,14 +91,27 @@ class Majorant:
 
     monomials: NDArray[np.intp]
     coefficients: Array
+    signed: Array  # (n, M), R's own coefficients, rounded
     box: Array  # (n + m,)
     crumbs: Array  # (n,), bound on the box of all terms whose coefficients are but rounding
     slope: Array  # (n, n + m), bound of the tail's derivatives on the box; on s · box, s ≤ 1, s^ORDER times that
 
     def __call__(self, Y: Array) -> Array:
         """R̄ (n, K) at sizes Y (n + m, K) ≥ 0, its tail left out; right but for SLACK."""
-        factors = np.concatenate([Y, np.ones((1, Y.shape[1]))])[self.monomials]
-        return self.coefficients @ np.multiply.reduce(factors, axis=1)
+        return self.coefficients @ self._products(Y)
+
+    def expansion(self, y: Array) -> Array:
+        """R (n, K) at y (n + m, K), its tail left out; right but for SLACK times R̄(|y|)."""
+        return self.signed @ self._products(y)
+
+    def _products(self, y: Array) -> Array:
+        factors = np.concatenate([y, np.ones((1, y.shape[1]))])[self.monomials]
+        return np.asarray(np.multiply.reduce(factors, axis=1))
+
+    def tail(self, far: Array, Y: Array) -> Array:
+        """Bound (n, K) of how the tail changes by Y (n + m, K) on the box far (n + m, K), inf out of the whole box."""
+        s = (far / self.box[:, None]).max(axis=0)
+        return np.where(s <= 1.0, s**ORDER * (self.slope @ Y), np.inf) + self.crumbs[:, None]
 
     def change(self, X: Array, at_X: Array, Y: Array) -> Array:
         """Bound (n, K) of |R(x + y, w) − R(x, w)|, inf out of the box.
@@ -106,9 +119,7 @@ class Majorant:
         X (n + m,) bounds (x, w), Y (n + m, K) bounds (y, 0); at_X (n,) is R̄(X).
         """
         far = X[:, None] + Y
-        s = (far / self.box[:, None]).max(axis=0)
-        tail = np.where(s <= 1.0, s**ORDER * (self.slope @ Y), np.inf) + self.crumbs[:, None]
-        return (self(far) * (1.0 + SLACK) - at_X[:, None] * (1.0 - SLACK) + tail) * (1.0 + SLACK)
+        return (self(far) * (1.0 + SLACK) - at_X[:, None] * (1.0 - SLACK) + self.tail(far, Y)) * (1.0 + SLACK)
 
 
 def majorant(system: ExactSystem, box: Array) -> Majorant:
@@ -120,9 +131,11 @@ def majorant(system: ExactSystem, box: Array) -> Majorant:
     one = system.n + system.m
     monomials = np.array([[*m, *[one] * (ORDER - len(m))] for m in found], dtype=np.intp).reshape(len(found), ORDER)
     values = np.array([[above(row[m]) if m in row else 0.0 for m in found] for row in rows])
+    signed = np.array([[float(arb(row[m]).mid()) if m in row else 0.0 for m in found] for row in rows])
     used = (values > CRUMB).any(axis=0)
     crumbs = (values[:, ~used] * np.prod(np.append(box, 1.0)[monomials[~used]], axis=1)).sum(axis=1)
-    return Majorant(monomials[used], values[:, used], box, crumbs * (1.0 + SLACK), _tail_slope(system, box))
+    kept = monomials[used], values[:, used], signed[:, used]
+    return Majorant(*kept, box, crumbs * (1.0 + SLACK), _tail_slope(system, box))
 
 
 def _tail_slope(system: ExactSystem, box: Array) -> Array:

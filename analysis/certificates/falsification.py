@@ -90,13 +90,8 @@ class Rows:
     e: Array  # (N, n), x − x_lin of the motion at the rows' times
 
 
-def compare(found: Motions, times: Array, x: Array, allowed: Callable[[Array], Array], rounding: Array) -> Rows:
-    """Judge rows x (N, n) with printed digits good to `rounding` (N, n).
-
-    allowed : how far (n,) the integrator may be off a motion (N, n).
-    """
-    expected, e, off = found.at(times)
-    limit = off + rounding + allowed(expected)
+def judged(x: Array, expected: Array, limit: Array, e: Array) -> Rows:
+    """Rows x (N, n) that may be off the expected ones by the limit (N, n)."""
     ratio = np.abs(x - expected) / limit
     row, state = (int(i) for i in np.unravel_index(np.argmax(ratio), ratio.shape))
     out: list[int] = np.flatnonzero(~(ratio <= 1.0).all(axis=1)).tolist()

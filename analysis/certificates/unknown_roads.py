@@ -1,34 +1,29 @@
 """Motions on every road of a class whose heights are known at the rows only: what holds for all, at all times.
 
-Between rows a road of class `curv` has |h''| ≤ H2 (corners only at rows), of class `lip` |h'| ≤ H1. Polynomials near
-the heights make a road of their own, with a proved tube. Any other road of the class is off it by η, its x_lin by at
-most ∫|e^(At) B| dt η, and x − x_lin by what that changes in the nonlinear terms alone (`growth.perturbed`).
+Between rows a road of class `curv` has |h''| ≤ H2 (corners only at rows), of class `lip` |h'| ≤ H1. The straight line
+from height to height is in the middle of what a class leaves open. x_lin is as far off that of the straight lines as
+∫|e^(At) B| dt makes of it; x − x_lin is known much better, as it feels the road only through x, which the rows show.
 """
 
 from __future__ import annotations
 
-from bisect import bisect_right
-from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
-from flint import arb, arb_mat, fmpq
-from numpy.polynomial import chebyshev, polynomial
+from flint import arb_mat
+from scipy.linalg import expm
 
-from ..bertolino_baksa.balls import Array, decimal, rounded
-from ..bertolino_baksa.cells import Decay, counts, decay, errors, inputs, ranges, widths
-from ..bertolino_baksa.growth import perturbed
-from ..bertolino_baksa.majorant import majorant
-from ..bertolino_baksa.norms import Norm
+from fmu_src.quantities import ROAD_HEIGHTS
+
+from ..bertolino_baksa.balls import Array, ExactSystem, matrix, rounded
+from ..bertolino_baksa.norms import Metric
+from ..bertolino_baksa.sampled import EPS, Between, Samples, between
 from ..bertolino_baksa.tube import input_matrix
 from ..errors import InputError
-from .falsification import Motions
+from .falsification import Rows, judged
 
-LONGEST, DEGREE = 0.02, 5  # s, of a polynomial, and its degree
-FIT = 0.25  # of what the class leaves open between rows: what a polynomial may be off at them
-SLACK = 1.0 + 1e-9  # for the roundings of the bounds of polynomials
-ROOM, ROOM_INPUT = 1.5, 10.0  # of the box on which the equations are bounded, over the largest motion and input
+TURN = 0.1  # rad that the fastest mode turns over a step of ∫|e^(At) B| dt
+SLACK = 1.0 + 1e-9  # for the roundings of times and heights
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,18 +36,18 @@ class RoadClass:
     def __str__(self) -> str:
         return f"{self.kind}:{self.bound:g}"
 
-    def between(
-        self, polynomials: Array, width: float, step: float, at_rows: Array, jumps: Array
-    ) -> tuple[Array, Array]:
-        """(4,), (4,): how far heights and rates may be off polynomials (4, k) in τ over this width [s].
-
-        at_rows, jumps : bounds (4,) of what these are off at rows, and of its change from row to row.
+    def between(self, steps: Array, slopes: Array, loose: Array) -> tuple[Array, Array, Array]:
+        """(N, 4) each: how far heights may be off the chords of these steps [s] and slopes [m/s], at most and on the
+        average of half a step, and how far rates may be; slopes are good to `loose`.
         """
+        s, none = steps[:, None], np.zeros_like(slopes)
         if self.kind == "curv":
-            open_ = self.bound + _largest_derivative(polynomials, 2) / width**2
-            return at_rows + open_ * step**2 / 8.0, jumps / step + open_ * step / 2.0
-        open_ = self.bound + _largest_derivative(polynomials, 1) / width
-        return at_rows + open_ * step / 2.0, open_
+            return self.bound * s**2 / 8.0 + none, self.bound * s**2 / 12.0 + none, self.bound * s / 2.0 + loose
+        most = max(self.bound, 1e-300)
+        least, steepest = (np.clip((np.abs(slopes) + d) / most, 0.0, 1.0) for d in (-loose, loose))
+        peak = self.bound * s / 2.0 * (1.0 - least**2)
+        # it is off by at most (1 + slope/bound) bound times the time from the nearer row, and by the peak
+        return peak, peak * (1.0 + steepest) / 2.0, self.bound + np.abs(slopes)
 
 
 def road_class(text: str) -> RoadClass:
@@ -67,118 +62,61 @@ def road_class(text: str) -> RoadClass:
     return RoadClass(kind, bound)
 
 
-@dataclass(frozen=True, slots=True)
-class FittedRoad:
-    """Polynomials near the heights, as the pieces of an exact system, and η of the class, for each window."""
+def samples(times: Array, x: Array, allowed: Array, heights: Array, rounding: Array, roads: RoadClass) -> Samples:
+    """Rows and what the class leaves open between them.
 
-    pieces: tuple[tuple[fmpq, Callable[[Any], list[Any]]], ...]
-    eta: Array  # (windows, 8): of heights and rates
-
-
-def fitted_road(times: Array, heights: Array, rounding: Array, roads: RoadClass) -> FittedRoad:
-    """Windows of at most LONGEST, as long as polynomials fit: they end at the rows where the road has corners.
-
+    x, allowed : (N, 14), the rows' states and how far a motion may be off them.
     heights, rounding : (N, 4) [m].  Raises InputError where the heights contradict the class.
     """
-    exact = [decimal(t) for t in times.tolist()]
-    pieces, eta, i = [], [], 0
-    while i < len(times) - 1:
-        j = i + max(1, int(np.searchsorted(times[i + 1 :], times[i] + LONGEST, side="right")))
-        while True:
-            rows = slice(i, j + 1)
-            polynomials, off, fits = _fit(times[rows], heights[rows], rounding[rows], roads)
-            if fits or j == i + 1:
-                break
-            j = i + (j - i) // 2 if j - i > 4 else j - 1
-        pieces.append((exact[i], _inputs(polynomials, exact[i], exact[j] - exact[i])))
-        eta.append(off)
-        i = j
-    return FittedRoad(tuple(pieces), np.array(eta))
-
-
-def _fit(t: Array, h: Array, rounding: Array, roads: RoadClass) -> tuple[Array, Array, bool]:
-    """Polynomials (4, k) in τ, η (8,) and whether they fit at the rows."""
-    width, steps = t[-1] - t[0], np.diff(t)
-    tau = (t - t[0]) / width
-    found = polynomial.polyfit(tau, h, min(DEGREE, len(t) - 1)).T
-    off = np.abs(polynomial.polyval(tau, found.T).T - h) + rounding + 1e-14 * np.abs(found).sum(axis=1)
-    step = float(steps.max()) * SLACK
-    jumps = 2.0 * off.max(axis=0) * step / float(steps.min())
-    zero = np.zeros(4)
-    height, rate = roads.between(found, width, step, off.max(axis=0), jumps)
-    least, _ = roads.between(found, width, step, zero, zero)
-    slopes = np.abs(np.diff(h, axis=0)) - rounding[1:] - rounding[:-1]
-    if roads.kind == "lip" and np.any(slopes > roads.bound * steps[:, None] * SLACK):
-        raise InputError(f"the heights between t = {t[0]:g} s and {t[-1]:g} s rise faster than {roads.bound:g} m/s")
-    return found, np.append(height, rate) * SLACK, bool(np.all(off.max(axis=0) <= FIT * least))
-
-
-def _largest_derivative(polynomials: Array, order: int) -> Array:
-    """Bounds (4,) of the derivatives over 0 ≤ τ ≤ 1: Chebyshev polynomials stay within 1."""
-    found = []
-    for p in polynomials:
-        shifted: Any = polynomial.Polynomial(p)(polynomial.Polynomial([0.5, 0.5]))
-        there = shifted.deriv(order).coef * 2.0**order
-        found.append(float(np.abs(chebyshev.poly2cheb(there)).sum()) * SLACK)
-    return np.array(found)
-
-
-def _inputs(polynomials: Array, begin: fmpq, width: fmpq) -> Callable[[Any], list[Any]]:
-    rows: Sequence[Sequence[float]] = polynomials.tolist()
-
-    def w(t: Any) -> list[Any]:
-        tau = (t - arb(begin)) / arb(width)
-        heights, rates = [], []
-        for row in rows:
-            height, rate = arb(0), arb(0)
-            for c in reversed(row):  # Horner's scheme, for value and slope
-                rate, height = rate * tau + height, height * tau + arb(c)
-            heights.append(height)
-            rates.append(rate / arb(width))
-        return heights + rates
-
-    return w
+    steps = np.diff(times)
+    slopes, digits = np.diff(heights, axis=0) / steps[:, None], np.maximum(rounding[1:], rounding[:-1])
+    loose = 2.0 * digits / steps[:, None]
+    if roads.kind == "lip" and np.any(steep := np.abs(slopes) - loose > roads.bound * SLACK):
+        row, wheel = np.argwhere(steep)[0].tolist()
+        raise InputError(
+            f"the heights rise faster than {roads.bound:g} m/s: by {abs(slopes[row, wheel]):.4g} m/s from row "
+            f"{row + 2} on, column {ROAD_HEIGHTS[wheel].name}"
+        )
+    peak, mean, rate = roads.between(steps * SLACK, slopes, loose)
+    inputs = np.stack([np.hstack([h, slopes]) for h in (heights[:-1], heights[1:])], axis=1)
+    off = (np.hstack([height + digits, rate]) * SLACK for height in (peak, mean))
+    return Samples(times, x, allowed, inputs, *off)
 
 
 @dataclass(frozen=True, slots=True)
 class AllRoads:
-    """What holds on all roads of the class, for motions of one start: q bounds ‖(x − x_lin) − (x̂ − x̂_lin)‖_S."""
+    """What holds for all motions that fit the rows, on all roads of the class."""
 
-    motions: Motions
-    q: Array  # (cells,)
-    spread: Array  # (n,) bounds of |x_lin − x̂_lin|
+    found: Between
+    spread: Array  # (N, n) bounds, at the rows, of how far x_lin may be off that of the straight lines
 
-    @property
-    def off(self) -> Array:
-        """Bounds (n,) of |x − x̂|."""
-        return self.spread + self.motions.metric.reach * float(self.q.max())
-
-    def largest_error(self, norm: Norm) -> float:
-        """sup N(x − x_lin) over all times and all roads of the class."""
-        found = errors(self.motions.tube, self.motions.metric, norm) + self.motions.metric.of(norm) * self.q
-        return float(found.max()) * SLACK
+    def rows(self, x: Array, allowed: Array) -> Rows:
+        """Judge rows x (N, n) of which the motion may be off by `allowed` (N, n)."""
+        expected, e, off = self.found.rows()
+        return judged(x, expected, off + self.spread + allowed, e)
 
 
-def on_all_roads(found: Motions, road: FittedRoad) -> AllRoads:
-    """Widen the tube on the fitted road to all roads of its class."""
-    system, metric, pieces = found.system, found.metric, found.tube.pieces
-    begins = [begin for begin, _ in system.pieces]
-    window = [bisect_right(begins, p.begin) - 1 for p in pieces]
-    eta = np.repeat(road.eta[window], counts(pieces, metric), axis=0)
-    spread = _gains(decay(metric, pieces), input_matrix(system)) @ eta.max(axis=0) * SLACK
-    X = np.hstack([ranges(pieces, found.tube.full, metric), inputs(system, metric, pieces)])
-    widening = np.hstack([np.tile(spread, (len(eta), 1)), eta])
-    room = np.concatenate([np.full(system.n, ROOM), np.full(system.m, ROOM_INPUT)])
-    bound = majorant(system, room * (X + widening).max(axis=0) + 1e-9)
-    top, _ = perturbed(metric, bound, widths(pieces, metric), X, widening[:, :, None], np.zeros(1))
-    return AllRoads(found, top[:, 0], spread)
+def on_all_roads(system: ExactSystem, metric: Metric, rows: Samples) -> AllRoads:
+    """Raises NotProvedError if the rows leave too much open."""
+    since = rows.times - rows.times[0]
+    return AllRoads(between(system, metric, rows), _spread(metric, input_matrix(system), since, rows.peak.max(axis=0)))
 
 
-def _gains(found: Decay, B: arb_mat) -> Array:
-    """∫|e^(At) B| dt (n, m) from 0 to the end of the cells, bounded."""
-    centre, rest = rounded(B)
-    sizes = np.abs(found.ends @ centre)
-    most = np.maximum(sizes[:-1], sizes[1:]) + found.curve @ np.abs(centre)
-    more = (found.off + 1e-13 * np.abs(found.ends).max()) * (np.abs(centre).sum() + rest) * len(centre)
-    more += rest * np.abs(found.ends).max() * len(centre)
-    return np.asarray((most + more).transpose(1, 2, 0) @ found.width * SLACK)
+def _spread(metric: Metric, B: arb_mat, times: Array, peak: Array) -> Array:
+    """Bounds (N, n) of |∫ e^(As) B η(s) ds| from 0 to each time, for |η| ≤ peak (m,).
+
+    Over a step by its two ends and what their chord may miss: ‖e^(As) y‖_S ≤ ‖y‖_S.
+    """
+    A, moved = (rounded(matrix(metric.S) * m)[0] for m in (metric.A * metric.inverse, B))
+    back, fastest = rounded(metric.inverse)[0], float(np.abs(np.linalg.eigvals(A)).max())
+    count = int(times[-1] * fastest / TURN) + 1
+    step = times[-1] / count
+    over, ends = expm(A * step), [moved]
+    for _ in range(count):
+        ends.append(over @ ends[-1])
+    y = np.array(ends)
+    sizes, bends = np.abs(back @ y), np.sqrt(((A @ A @ y[:-1]) ** 2).sum(axis=1)) * step**2 / 8.0
+    rounding = EPS * np.sqrt((moved**2).sum(axis=0)) * count
+    steps = (sizes[:-1] + sizes[1:]) / 2.0 + metric.reach[:, None] * (bends + rounding)[:, None, :]
+    whole = np.concatenate([np.zeros((1, len(A))), np.cumsum(steps @ peak, axis=0) * step])
+    return np.asarray(whole[np.minimum(np.ceil(times / step * SLACK).astype(int), count)] * SLACK)
