@@ -67,7 +67,8 @@ def _parser() -> argparse.ArgumentParser:
     verb.set_defaults(do=_simulate)
 
     verb = verbs.add_parser("check", help="check the claims on a run and write its findings.json")
-    verb.add_argument("run", type=Path, metavar="RUN", help="run folder, or a .csv that another tool wrote")
+    what = "run folder, or FILE.csv that another tool wrote (its findings go to FILE.findings.json)"
+    verb.add_argument("run", type=Path, metavar="RUN", help=what)
     verb.add_argument("--road-class", metavar="CLASS", help="for a .csv: 'exact', the scenario's profile is the road")
     verb.add_argument("--parameters", metavar="SCENARIO", help=f"for a .csv: its car and road: {scenario}")
     verb.set_defaults(do=_check)

@@ -228,7 +228,7 @@ def test_an_export_by_fmpy_goes_through_the_same_door(dist: Path, tmp_path: Path
     )
     fmpy_writes(str(tmp_path / "fmpy.csv"), result)
     flat = tmp_path / "flat.toml"
-    flat.write_text('[parameters]\nprofile = "flat"\n')
+    flat.write_text('[parameters]\nprofile = "flat"\nenabled = false\n')
     assert check_file(tmp_path / "fmpy.csv", "--parameters", str(flat)) == 0
     assert check_file(tmp_path / "fmpy.csv", "--parameters", "bump") == 1
 

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from fmu_src.quantities import FORCES, STATES
+from fmu_src.quantities import STATES
 
 from ..bertolino_baksa.balls import NotProvedError
 from ..bertolino_baksa.certificate import Certificate, Claim, from_json, to_json
@@ -23,18 +23,7 @@ from ..trajectory import CERTIFICATE, Run
 from .car_certificates import certify_car
 from .certificate_command import statement
 from .certificate_figures import adversary_points, draw_delta, draw_tube, in_tube, linear_motion
-
-
-def acting(run: Run) -> str:
-    """Why proofs of the passive car say nothing of a run's motion; "" if they do."""
-    names = [q.name for q in FORCES]
-    recorded = [name for name in names if name in run.trajectory.names]
-    if recorded and np.any(run.trajectory.columns(recorded)):
-        return "the actuators act, and the proof is of the car without them"
-    if len(recorded) < len(names) and run.parameters.get("enabled", True):
-        missing = ", ".join(name for name in names if name not in recorded)
-        return f"the controller is on and {missing} are not recorded; a car without control has enabled = false"
-    return ""
+from .run_certificates import acting
 
 
 def silent(run: Run) -> str:
