@@ -4,19 +4,29 @@ from __future__ import annotations
 
 import argparse
 import dataclasses
-import json
 import os
 import signal
 import sys
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import NoReturn
 
 from fmu_src.quantities import ParameterError
 
 from .errors import CosimError, InputError
-from .files import write_whole
 from .scenario import Scenario, built_in_scenarios, read_scenario
-from .trajectory import COUNTERPART, FINDINGS, Run, new_run_folder, read_record, read_run, write_run
+from .trajectory import (
+    CERTIFICATE,
+    COUNTERPART,
+    FINDINGS,
+    RECORD,
+    Run,
+    new_run_folder,
+    read_record,
+    read_run,
+    write_run,
+)
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -57,7 +67,8 @@ def _parser() -> argparse.ArgumentParser:
     verb.set_defaults(do=_simulate)
 
     verb = verbs.add_parser("check", help="check the claims on a run and write its findings.json")
-    verb.add_argument("run", type=Path, metavar="RUN", help="run folder, or a .csv that another tool wrote")
+    what = "run folder, or FILE.csv that another tool wrote (its findings go to FILE.findings.json)"
+    verb.add_argument("run", type=Path, metavar="RUN", help=what)
     verb.add_argument("--road-class", metavar="CLASS", help="for a .csv: 'exact', the scenario's profile is the road")
     verb.add_argument("--parameters", metavar="SCENARIO", help=f"for a .csv: its car and road: {scenario}")
     verb.set_defaults(do=_check)
@@ -80,8 +91,8 @@ def _parser() -> argparse.ArgumentParser:
     verb.set_defaults(do=_modes)
 
     verb = verbs.add_parser("certify", help="prove that x_lin is almost stable (definition 2.1) on a scenario's road")
-    verb.add_argument("scenario", help=scenario)
-    verb.add_argument("-o", "--out", type=Path, metavar="CERT", help="certificate to write (JSON)")
+    verb.add_argument("scenario", help=f"{scenario}; or a run folder, which then gets its certificate and figures")
+    verb.add_argument("-o", "--out", type=Path, metavar="CERT.json", help="certificate to write; CERT.svg: its figure")
     kind = verb.add_mutually_exclusive_group()
     kind.add_argument("--quick", action="store_true", help="a coarse floor in a second, by scalar comparison")
     kind.add_argument("--largest", action="store_true", help="also search the largest amplitude that can be certified")
@@ -156,6 +167,7 @@ def _run(options: argparse.Namespace) -> int:
         _compare_fmus(options.scenario, run)
         write_run(run, folder)
         _simulate_counterpart(scenario, run, folder / COUNTERPART)
+        _certify_shortly(run, folder)
         verdict = 0
         if missing := lacking(run):
             print(f"nothing is checked: {', '.join(missing)} are not among `record`", file=sys.stderr)
@@ -165,6 +177,15 @@ def _run(options: argparse.Namespace) -> int:
         write_report(folder)
     print(f"{target / 'report.html'}: written")
     return verdict
+
+
+def _certify_shortly(run: Run, folder: Path) -> None:
+    """Prove almost stability for the report, where it applies and takes seconds; else say why not."""
+    from .certificates.certified_run import certify_run, road_ends
+
+    wait = "the road has no end, so that it takes longer: certify RUN"
+    if reason := certify_run(run, folder) if road_ends(run) else wait:
+        print(f"no certificate of almost stability: {reason}", file=sys.stderr)
 
 
 def _ride(options: argparse.Namespace) -> int:
@@ -213,20 +234,27 @@ def _check(options: argparse.Namespace) -> int:
 
 def _judge(run: Run, folder: Path) -> int:
     """Check, write findings.json, print a line for each; 0 if all hold, 1 if not."""
+    from .certificates.certified_run import definition_findings
     from .certificates.run_certificates import certified_findings
     from .check import check
+    from .findings import Finding, write_findings
     from .run_averaging import averaged_findings
     from .run_series import series_findings
 
     findings = check(run)
-    others = {"averaging": averaged_findings, "series": series_findings, "proof": certified_findings}
+    others: dict[str, Callable[[Run], tuple[list[Finding], str]]] = {
+        "averaging": averaged_findings,
+        "series": series_findings,
+        "proof": certified_findings,
+    }
+    if (path := folder / CERTIFICATE).is_file():
+        others["certificate"] = partial(definition_findings, path=path)
     for name, judged in others.items():
         found, why_not = judged(run)
         findings += found
         if why_not:
             print(f"{name}: not all is compared with the run: {why_not}", file=sys.stderr)
-    text = json.dumps([f.as_json() for f in findings], indent=1, ensure_ascii=False) + "\n"
-    write_whole(folder / FINDINGS, text.encode())
+    write_findings(findings, folder / FINDINGS)
     for f in findings:
         print(f.line)
     return 0 if all(f.holds for f in findings) else 1
@@ -272,6 +300,10 @@ def _modes(options: argparse.Namespace) -> int:
 def _certify(options: argparse.Namespace) -> int:
     from .certificates.certificate_command import make_certificate, quick_answer
 
+    if (folder := Path(options.scenario)).is_dir():
+        return _certify_run(folder, options)
+    if options.out and options.out.suffix == ".svg":
+        raise InputError(f"-o {options.out}: wanted a name for the certificate, CERT.json; its figure is CERT.svg")
     scenario = read_scenario(options.scenario)
     if options.out and (options.quick or options.bounded is not None):
         raise InputError(f"-o {options.out}: --quick and --bounded write no certificate; leave it out")
@@ -286,6 +318,18 @@ def _certify(options: argparse.Namespace) -> int:
     if options.quick:
         return quick_answer(scenario.parameters)
     return make_certificate(scenario.parameters, options.out, largest=options.largest)
+
+
+def _certify_run(folder: Path, options: argparse.Namespace) -> int:
+    from .certificates.certified_run import certify_run
+
+    if options.out or options.quick or options.largest or options.closed_loop or options.bounded is not None:
+        raise InputError(f"{folder}: a run folder is certified without options; for them give {folder / RECORD}")
+    if reason := certify_run(read_run(folder), folder):
+        print(f"no certificate: {reason}")
+        return 1
+    print(f"{folder / CERTIFICATE}: written; python -m analysis report {folder} shows its figures")
+    return 0
 
 
 def _verify(options: argparse.Namespace) -> int:

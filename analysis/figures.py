@@ -12,12 +12,14 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from lxml import etree
 from matplotlib import style
 from matplotlib.figure import Figure
 from matplotlib.rcsetup import cycler
 
 from fmu_src.quantities import CORNER_WORDS, ROAD_HEIGHTS, Quantity
 
+from .errors import InputError
 from .trajectory import Array, Trajectory
 
 Axes = Any  # of matplotlib, whose types are not looked at here
@@ -53,6 +55,7 @@ STYLE = {
     "svg.hashsalt": "bertolino-baksa",  # else the ids in the file are new each time
 }
 WIDTH, PANEL_HEIGHT, PICTURE_HEIGHT = 7.2, 2.5, 2.0  # inches
+DUBLIN_CORE = "http://purl.org/dc/elements/1.1/"  # namespace of an SVG's own title and description
 COLUMNS = 2000  # of a panel, finer than the eye or a printer
 
 
@@ -67,6 +70,7 @@ class Subject:
     sources: Sequence[Trajectory]
     needs: Sequence[Quantity]
     window: Callable[[], Window] | None = None  # of time [s]; by default the eventful one
+    shared: bool = True  # one axis of time for all panels; else each panel has an axis of its own
 
     @property
     def missing(self) -> list[str]:
@@ -181,20 +185,43 @@ def plot_tyre_loads(time: Array, loads: Array, quantities: Sequence[Quantity], a
 
 
 # ------------------------------------------------------------------ to SVG
-def render(subject: Subject) -> bytes:
-    """The figure as SVG; the same data give the same bytes, whatever style the user has set."""
+def render(subject: Subject, caption: str | None = None) -> bytes:
+    """The figure as SVG; the same data give the same bytes, whatever style the user has set.
+
+    caption : is kept in the file as its description (Dublin Core), for `described`.
+    """
     with style.context(STYLE, after_reset=True):
         n = len(subject.panels)
         figure = Figure(figsize=(WIDTH, PANEL_HEIGHT * n + 0.4), layout="constrained")
-        axes = figure.subplots(n, 1, sharex=True, squeeze=False).ravel()
+        axes = figure.subplots(n, 1, sharex=subject.shared, squeeze=False).ravel()
         for panel, ax in zip(subject.panels, axes, strict=True):
-            panel(ax).label_outer()
-        start, end = subject.window() if subject.window else eventful(subject.sources, subject.needs)
-        if start < end:
-            axes[0].set_xlim(start, end)
-        for line in (line for ax in axes for line in ax.get_lines()):
+            panel(ax)
+        if subject.shared:
+            _share_time(subject, list(axes))
+        return _svg(figure, subject.title, caption)
+
+
+def _share_time(subject: Subject, axes: Sequence[Axes]) -> None:
+    """The subject's window of time, labelled below the last panel only."""
+    start, end = subject.window() if subject.window else eventful(subject.sources, subject.needs)
+    if start < end:
+        axes[0].set_xlim(start, end)
+    for ax in axes:
+        ax.label_outer()
+        for line in ax.get_lines():
             thin(line, (start, end))
-        return _svg(figure, subject.title)
+
+
+def described(image: bytes, where: str) -> tuple[str, str]:
+    """Title and caption that `render` kept in an SVG. Raises InputError if there are none."""
+    try:
+        root = etree.fromstring(image, etree.XMLParser(resolve_entities=False, no_network=True))
+    except etree.XMLSyntaxError as error:
+        raise InputError(f"{where}: cannot be read as SVG: {error}") from error
+    title, caption = (root.findtext(f".//{{{DUBLIN_CORE}}}{name}") for name in ("title", "description"))
+    if not (title and caption):
+        raise InputError(f"{where}: wanted a figure with title and description, as `certify RUN` draws it")
+    return title, caption
 
 
 def render_pictures(pictures: Sequence[Panel], columns: int, title: str) -> bytes:
@@ -212,9 +239,10 @@ def render_pictures(pictures: Sequence[Panel], columns: int, title: str) -> byte
         return _svg(figure, title)
 
 
-def _svg(figure: Figure, title: str) -> bytes:
+def _svg(figure: Figure, title: str, caption: str | None = None) -> bytes:
     image = io.BytesIO()
-    figure.savefig(image, format="svg", metadata={"Title": title, "Date": None, "Creator": None})
+    about = {"Title": title, "Description": caption, "Date": None, "Creator": None}
+    figure.savefig(image, format="svg", metadata=about)
     return image.getvalue()
 
 

@@ -2,8 +2,13 @@
 
 from __future__ import annotations
 
+import json
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass
+from pathlib import Path
 from typing import Any
+
+from .files import write_whole
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -32,3 +37,9 @@ class Finding:
     def as_json(self) -> dict[str, Any]:
         """All fields and the verdict."""
         return {**asdict(self), "holds": self.holds}
+
+
+def write_findings(findings: Sequence[Finding], path: Path) -> None:
+    """Write a findings.json: a list of all findings with their verdicts."""
+    text = json.dumps([f.as_json() for f in findings], indent=1, ensure_ascii=False) + "\n"
+    write_whole(path, text.encode())

@@ -92,7 +92,8 @@ def write_report(run_folder: Path) -> Path:
     if counterpart:
         _check_record(counterpart.record, there / RECORD)
     findings = read_findings(run_folder / FINDINGS)
-    entries = run_figures.draw_all(run, counterpart, run_folder)
+    certified = run_figures.certified(run_folder)
+    entries = [*run_figures.draw_all(run, counterpart, run_folder), *certified]
     page = _template().render(
         title=run.record["scenario"].get("title") or run.record["scenario"].get("name") or "A run",
         summary=summary(run),
@@ -103,6 +104,7 @@ def write_report(run_folder: Path) -> Path:
         figures=[(entry, _as_data(run_folder / run_figures.FOLDER / entry.file)) for entry in entries],
         left_out=run_figures.left_out(run, counterpart),
         counterpart=counterpart is not None,
+        certified=bool(certified),
         rides=ride_columns(run, counterpart),
         parameters=parameter_table(run),
         band=BAND,

@@ -17,6 +17,7 @@ from .figures import (
     Axes,
     Subject,
     Window,
+    described,
     plot_comparison,
     plot_discrepancy,
     plot_heaves,
@@ -32,6 +33,7 @@ from .trajectory import Run, Trajectory
 from .tyres import static_loads, tyre_loads
 
 FOLDER = "figures"
+TUBE, DELTA = "certified-tube.svg", "certified-delta.svg"  # drawn by `certify RUN`, with their captions in them
 Z, PSI, PHI, Z11, Z12, Z2, PSI2 = POSITIONS
 
 
@@ -52,6 +54,12 @@ def draw_all(run: Run, counterpart: Run | None, folder: Path) -> list[FigureEntr
     for subject in drawn:
         write_whole(target / subject.file, render(subject))
     return [FigureEntry(subject.file, subject.title, subject.caption()) for subject in drawn]
+
+
+def certified(folder: Path) -> list[FigureEntry]:
+    """The figures that `certify RUN` drew into a run's folder, if any. Raises InputError for what it did not draw."""
+    found = [folder / FOLDER / name for name in (TUBE, DELTA)]
+    return [FigureEntry(path.name, *described(path.read_bytes(), str(path))) for path in found if path.is_file()]
 
 
 def left_out(run: Run, counterpart: Run | None) -> list[tuple[str, list[str]]]:

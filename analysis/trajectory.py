@@ -25,6 +25,7 @@ from .errors import InputError
 
 Array = NDArray[np.float64]
 CSV, RECORD, FINDINGS, COUNTERPART = "trajectory.csv", "run.json", "findings.json", "counterpart"
+CERTIFICATE = "certificate.json"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

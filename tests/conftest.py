@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import sys
+import sysconfig
+import venv
 from collections.abc import Callable
 from dataclasses import asdict
 from pathlib import Path
@@ -55,3 +58,21 @@ def foreign(tmp_path: Path) -> Callable[..., Any]:
     from foreign_runs import runner
 
     return runner(tmp_path)
+
+
+@pytest.fixture(scope="session")
+def preload() -> str:
+    """The library of this Python, for hosts that have none."""
+    name = str(sysconfig.get_config_var("INSTSONAME"))
+    folders = [sysconfig.get_config_var("LIBDIR"), Path(sys.base_prefix, "lib")]
+    found = [path for folder in folders if (path := Path(str(folder), name)).is_file()]
+    assert found, f"{name} is in none of {folders}; Debian has it in libpython3, other Pythons with --enable-shared"
+    return str(found[0])
+
+
+@pytest.fixture(scope="session")
+def bare(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The programs of a virtual environment in which nothing is installed."""
+    folder = tmp_path_factory.mktemp("bare")
+    venv.create(folder, with_pip=False)
+    return folder / "bin"

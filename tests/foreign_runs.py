@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import os
+import shutil
 import signal
 import subprocess
 import sys
+import sysconfig
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import cache
@@ -70,6 +72,19 @@ def call(*command: object, cwd: Path, environment: Mapping[str, str] | None = No
     aborted = fragile and done.returncode == -signal.SIGABRT and "corrupted double-linked list" in said
     assert done.returncode == 0 or aborted, f"{' '.join(words)} ended with {end}:\n{said[-3000:]}"
     return said
+
+
+def ecos(folder: Path, preload: str, *options: object) -> None:
+    """Call `ecos simulate` in this folder, into which it writes SYSTEM.csv; it calls `unzip`."""
+    program = folder / "ecos"
+    shutil.copy(Path(sysconfig.get_path("purelib"), "ecospy", "binaries", "ecos"), program)
+    program.chmod(0o755)
+    environment = {
+        "PATH": os.pathsep.join([str(Path(sys.executable).parent), os.environ["PATH"]]),  # this Python's own library
+        "LD_PRELOAD": preload,
+        "LD_LIBRARY_PATH": str(Path(sys.prefix, "lib")),  # libtbb.so.12
+    }
+    call(program, "simulate", *options, cwd=folder, environment=environment, fragile=True)
 
 
 def runner(folder: Path) -> Runner:

@@ -2,39 +2,19 @@
 
 from __future__ import annotations
 
-import os
 import shutil
 import subprocess
 import sys
 import sysconfig
-import venv
 from collections.abc import Callable
 from pathlib import Path
 
 import fmpy
 import numpy as np
 import pytest
-from foreign_runs import COUNT, FOREIGN, SAME, STATE_NAMES, STEP, call, ours
+from foreign_runs import COUNT, FOREIGN, SAME, STATE_NAMES, STEP, call, ecos, ours
 from foreign_systems import write_plan
 from small_master import deviation, read_recording
-
-
-@pytest.fixture(scope="session")
-def preload() -> str:
-    """The library of this Python, for hosts that have none."""
-    name = str(sysconfig.get_config_var("INSTSONAME"))
-    folders = [sysconfig.get_config_var("LIBDIR"), Path(sys.base_prefix, "lib")]
-    found = [path for folder in folders if (path := Path(str(folder), name)).is_file()]
-    assert found, f"{name} is in none of {folders}; Debian has it in libpython3, other Pythons with --enable-shared"
-    return str(found[0])
-
-
-@pytest.fixture(scope="session")
-def bare(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The programs of a virtual environment in which nothing is installed."""
-    folder = tmp_path_factory.mktemp("bare")
-    venv.create(folder, with_pip=False)
-    return folder / "bin"
 
 
 @pytest.fixture
@@ -88,18 +68,9 @@ def test_libcosims_c_library_runs_the_ssp_from_a_c_program(
     assert deviation(read_recording(tmp_path / "result"), ours(system).between(1)) < SAME
 
 
-def test_the_command_line_of_ecos_runs_the_ssp(system: Path, tmp_path: Path, preload: str, bare: Path) -> None:
+def test_the_command_line_of_ecos_runs_the_ssp(system: Path, tmp_path: Path, preload: str) -> None:
     """A C++ program; it calls `unzip`, writes six decimals, and stops a step early where the sum of steps passes it."""
-    program = tmp_path / "ecos"
-    shutil.copy(Path(sysconfig.get_path("purelib"), "ecospy", "binaries", "ecos"), program)
-    program.chmod(0o755)
-    environment = {
-        "PATH": os.pathsep.join([str(bare), str(Path(shutil.which("unzip") or "").parent)]),
-        "LD_PRELOAD": preload,
-        "LD_LIBRARY_PATH": str(Path(sys.prefix, "lib")),  # libtbb.so.12
-    }
-    options = ("--path", system, "--stopTime", 0.6, "--stepSize", STEP)
-    call(program, "simulate", *options, cwd=tmp_path, environment=environment, fragile=True)
+    ecos(tmp_path, preload, "--path", system, "--stopTime", 0.6, "--stepSize", STEP)
     header, *lines = (tmp_path / "VehicleOnRoad.csv").read_text().splitlines()
     names = [name.strip().removesuffix("[REAL]").replace("::", ".", 1) for name in header.split(",")]
     rows = np.array([[float(x) for x in line.split(",")[:3]] for line in lines])

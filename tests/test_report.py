@@ -173,7 +173,7 @@ def test_a_run_alone_is_enough_and_little_of_it(tmp_path: Path) -> None:
     text = Page(report.write_report(folder)).text
     assert [path.name for path in (folder / "figures").iterdir()] == ["figure-03-front-wheels.svg"]
     assert "Not drawn: Car rotation angles; not recorded: body.roll, body.pitch." in text
-    assert "not been checked" in text and "no counterpart" in text
+    assert "certify RUN" in text and "not been checked" in text and "no counterpart" in text
     assert "tyre forces were not all recorded" in text and "body roll, left side up" not in text
 
 

@@ -23,6 +23,7 @@ SAMPLING = 5e-4  # s, of the true floor
 CANDIDATES = 64  # starts that the linear part proposes
 ROUNDS = 6  # of local search around the worst of them
 CROWD = 48  # starts of a round
+FEW = 8  # candidates are skipped for a picture: the best have neighbours nearly as good
 
 
 def motions(
@@ -93,6 +94,23 @@ def worst(
         near = at[:, None] + delta * 0.5**k * rng.normal(size=(len(x0), CROWD)) / norm(np.eye(len(x0)))[:, None] / 4.0
         crowd = near * delta / norm(near)
     return best, at
+
+
+def reached(
+    form: StandardForm, signal: Signal, norms: Sequence[Norm], x0: Array, deltas: Sequence[Array], stop: float
+) -> list[Array]:
+    """For each norm, sup N(x − x_lin) (K,) up to `stop` [s] over starts at N(x(0) − x0) = its deltas (K,).
+
+    Every FEW-th of the first starts of `worst`, without its search and all in one integration: for a picture.
+    """
+    crowds = []
+    for norm, delta in zip(norms, deltas, strict=True):
+        vertices = _vertices(form, norm, stop)[:, ::FEW]
+        both = np.concatenate([vertices, -vertices], axis=1)
+        crowds.append((both[:, None, :] * delta[:, None]).reshape(len(x0), -1))
+    found = excursions(form, signal, norms, x0, np.concatenate(crowds, axis=1), stop)
+    own = np.split(found, np.cumsum([crowd.shape[1] for crowd in crowds])[:-1], axis=1)
+    return [own[i][i].reshape(len(delta), -1).max(axis=1) for i, delta in enumerate(deltas)]
 
 
 def _vertices(form: StandardForm, norm: Norm, stop: float) -> Array:

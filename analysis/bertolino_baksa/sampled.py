@@ -172,7 +172,9 @@ def _change(bound: Majorant, X: Array, A: Array, widths: Array, pushed: Array, o
         if np.all(enough <= D):
             return change(enough)
         D = 2.0 * enough
-    raise NotProvedError("between its rows the motion is not known well enough: they are too far apart, or of no motion")
+    raise NotProvedError(
+        "between its rows the motion is not known well enough: they are too far apart, or of no motion"
+    )
 
 
 def _flow(metric: Metric, widths: Array, forcing: Array, start: Array) -> tuple[Array, Array, Array]:

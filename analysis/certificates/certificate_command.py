@@ -24,6 +24,7 @@ from ..methods.linear_response import linear_response
 from ..reference import Parameters, car_of, road_parameters
 from ..tyres import static_loads_of
 from .car_certificates import build, certify_car, metric_of, model_of, prove_reference, stops
+from .certificate_figures import adversary_points, draw_delta
 from .exact_car import exact_car, norms
 
 CLOSE = 1.02  # ratio at which the bisection for the largest amplitude stops
@@ -45,6 +46,9 @@ def make_certificate(parameters: Parameters, where: Path | None, *, largest: boo
     if where is not None:
         write_whole(where, to_json(certificate))
         print(f"{where}: written")
+        picture = where.with_suffix(".svg")
+        write_whole(picture, draw_delta(adversary_points(certificate)))
+        print(f"{picture}: written")
     return 0
 
 

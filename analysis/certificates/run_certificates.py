@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -16,15 +17,15 @@ from ..car import road_signal
 from ..check import own_error
 from ..discrepancy import scales
 from ..errors import InputError
-from ..findings import Finding
+from ..findings import Finding, write_findings
 from ..methods.polynomials import Array
 from ..reference import car_of, road_of, road_parameters
-from ..scenario import read_scenario
-from ..trajectory import Run
+from ..scenario import Scenario, read_scenario
+from ..trajectory import FINDINGS, Run
 from .authenticity import Defect, defect, profile, sampled
 from .car_certificates import metric_of
 from .exact_car import energy_norm, exact_system
-from .exported import read_export
+from .exported import BY_DEFAULT, SAMPLING, read_export
 from .falsification import Motions, Rows, judged, motions
 from .unknown_roads import AllRoads, RoadClass, on_all_roads, samples
 from .unknown_roads import road_class as read_class
@@ -44,9 +45,8 @@ def certified_findings(
     rounding : of each column's printed digits (N,); by default that of doubles.
     """
     columns = run.trajectory
-    u = [q.name for q in FORCES if q.name in columns.names]
-    if u and np.any(columns.columns(u)):
-        return [], "the actuators act, and the proof is of the car without them"
+    if reason := acting(run):
+        return [], reason
     if len(columns.time) < 2:
         return [], "a single row is no motion"
     t = columns.time[columns.time <= columns.time[0] + LONGEST]
@@ -80,20 +80,42 @@ def certified_findings(
     return [authentic, _of_rows(rows, own, t, file), _between_rows(run, rows, bound, roads)], ""
 
 
+def _as_exported(name: str) -> Scenario:
+    """The scenario with the road sampled at the start of steps, as by default in any master; a run.json knows."""
+    scenario = read_scenario(name)
+    if name.endswith(".json"):
+        return scenario
+    return replace(scenario, parameters={**scenario.parameters, SAMPLING: BY_DEFAULT})
+
+
+def acting(run: Run) -> str:
+    """Why proofs of the passive car say nothing of a run's motion; "" if they do."""
+    names = [q.name for q in FORCES]
+    recorded = [name for name in names if name in run.trajectory.names]
+    if recorded and np.any(run.trajectory.columns(recorded)):
+        return "the actuators act, and the proof is of the car without them"
+    if len(recorded) < len(names) and run.parameters.get("enabled", True):
+        missing = ", ".join(name for name in names if name not in recorded)
+        return f"the controller is on, but {missing} are not recorded; a car without control has enabled = false"
+    return ""
+
+
 def judge_export(path: Path, road_class: str | None, scenario: str | None) -> int:
     """Print what can be said of a CSV that another tool wrote; 0 if all holds, 1 if not or if nothing can be said.
 
+    The findings are written beside it: those of FILE.csv to FILE.findings.json, in the format of a run's findings.json.
     Raises InputError for an unknown class of roads, and for what is no export.
     """
     if road_class is None:
         raise InputError(f"{path}: wanted --road-class; a file alone says nothing of the road between its rows")
     roads = None if road_class == "exact" else read_class(road_class)
-    run, rounding = read_export(path, read_scenario(scenario or DEFAULT))
+    run, rounding = read_export(path, _as_exported(scenario or DEFAULT))
     findings, reason = certified_findings(run, rounding, str(path), roads)
     if reason:
         print(f"nothing is proved: {reason}")
     for finding in findings:
         print(finding.line)
+    write_findings(findings, path.with_suffix(f".{FINDINGS}"))
     return 0 if findings and all(finding.holds for finding in findings) else 1
 
 
