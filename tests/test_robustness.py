@@ -13,13 +13,15 @@ from flint import arb_mat
 from numpy.testing import assert_allclose
 
 from analysis.car import car_form
+from analysis.stabilization import study
 from analysis.stabilization.certified import _is_positive, around, certify, closed_loop, growth
-from analysis.stabilization.full_car import VARIED, car_plant, half_car_plant, strut_gain, varied_values
+from analysis.stabilization.full_car import VARIED, car_plant, full_gain, half_car_plant, strut_gain, varied_values
 from analysis.stabilization.half_car import corrected
 from analysis.stabilization.margins import Margins, loop_margins, margins
 from analysis.stabilization.regulator import Regulator, stationary
-from analysis.stabilization.study import WEIGHTS, lost_at
+from analysis.stabilization.study import WEIGHTS, lost_at, robustness
 from fmu_src.controller.design import design
+from fmu_src.controller.fullcar import FullCar
 from fmu_src.controller.halfcar import HalfCar
 from fmu_src.controller.law import ControlParameters, control_law
 from fmu_src.vehicle.linear import linearized
@@ -89,6 +91,17 @@ def test_the_half_car_keeps_the_promise_and_the_car_with_wheels_does_not(sharp_m
     assert min(loop.up for loop in promised.loops) == np.inf
     assert sharp_margins.return_difference < 0.5
     assert min(loop.up for loop in sharp_margins.loops) < 10.0
+
+
+def test_the_full_car_design_keeps_the_promise_where_the_half_car_design_loses_the_car() -> None:
+    lam = 1e13
+    own = robustness(car_plant(CAR), full_gain(FullCar(lam=lam)), varied_values(CAR))
+    assert own.margins is not None
+    assert own.margins.return_difference > 1.0 - 1e-9
+    assert all(loop.up == np.inf and loop.phase >= 60.0 for loop in own.margins.loops)
+    assert own.certified.proved == 1.0
+    assert own.growth < own.worst < 0.0
+    assert growth(car_plant(CAR), strut_gain(gain_of(lam)), varied_values(CAR)) > 0.0
 
 
 # ------------------------------------------------------------------ against eigenvalues
@@ -173,6 +186,10 @@ def test_the_gain_by_struts_is_that_of_the_controller(rng: np.random.Generator) 
     gain = strut_gain(np.array(made.infinite).reshape(2, 4))
     for x in rng.normal(size=(5, 14)):
         assert_allclose(gain @ x, law(1.0, x.tolist()), rtol=1e-12)
+    whole = FullCar(lam=1e11)
+    law = control_law(ControlParameters(model=whole, horizon="infinite"), design(whole, infinite=True, span=None))
+    x = rng.normal(size=14)
+    assert_allclose(full_gain(whole) @ x, law(1.0, x.tolist()), rtol=1e-12)
 
 
 def test_the_closed_loop_is_that_of_the_standard_form() -> None:
@@ -204,6 +221,14 @@ def test_the_weight_from_which_wheels_make_the_control_unstable() -> None:
     assert WEIGHTS[0] < lam < WEIGHTS[-1]
     rates = [growth(car_plant(CAR), strut_gain(gain_of(f * lam)), varied_values(CAR)) for f in (0.99, 1.01)]
     assert rates[0] < 0.0 < rates[1]
+
+
+@pytest.mark.parametrize(("weights", "lost"), [((1e8, 1e9), np.inf), ((1e13, 1e14), 1e13)])
+def test_without_such_a_weight_it_is_infinite_and_from_the_first_on_the_first(
+    weights: tuple[float, ...], lost: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(study, "WEIGHTS", weights)
+    assert lost_at(HALF_CAR) == pytest.approx(lost)
 
 
 # ------------------------------------------------------------------ proved

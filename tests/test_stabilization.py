@@ -38,6 +38,7 @@ from analysis.stabilization.regulator import (
     by_riccati,
     energy_to_rest,
     instants,
+    modal_reach,
     quadrature,
     riccati_solution,
     stationary,
@@ -162,6 +163,14 @@ def test_the_effort_to_rest_has_its_closed_form() -> None:
         energy_to_rest(DOUBLE, np.array([[0.0], [1.0]]), np.array([0.3, 0.0]), 2.0), 12 * 0.3**2 / 8, rtol=1e-10
     )
     assert energy_to_rest(DOUBLE, np.zeros((2, 1)), np.array([0.3, 0.0]), 2.0) == np.inf
+
+
+def test_the_reach_of_the_weakest_mode_has_its_closed_form_and_is_0_where_a_mode_is_out_of_reach() -> None:
+    """Left modes of this A: (1, 0) for −2, (3, 1)/√10 for −5."""
+    A = np.array([[-2.0, 0.0], [-9.0, -5.0]])
+    for b1, b2 in ((1.0, 0.5), (0.0, 1.0), (1.0, -3.0)):
+        expected = min(abs(b1), abs(3 * b1 + b2) / np.sqrt(10)) / np.hypot(b1, b2)
+        assert_allclose(modal_reach(A, np.array([[b1], [b2]])), expected, atol=1e-15)
 
 
 # ------------------------------------------------------------------ the half car
@@ -306,6 +315,8 @@ def test_one_control_instead_of_two_costs_more_and_reaches_less(x0: Array) -> No
     efforts = [energy_to_rest(m.A, m.B, x0, 2.0) for m in models]
     assert 1.1 < costs[1] / costs[0] < costs[2] / costs[0]
     assert 3.0 < efforts[1] / efforts[0] < efforts[2] / efforts[0]
+    reaches = [modal_reach(m.A, m.B) for m in models]  # measured: 0.10, 0.030, 0.00058: the saddle all but out of reach
+    assert reaches[0] > 3.0 * reaches[1] > 100.0 * reaches[2] > 0.0
 
 
 def test_the_printed_half_car_diverges_without_control(times: Array) -> None:
@@ -326,7 +337,8 @@ def test_the_command_writes_table_json_and_figures(
     data = json.loads((tmp_path / document.FILE).read_text(encoding="utf-8"))
     assert [model["rank of B"] for model in data["models"]] == [2, 1, 1]
     assert all(f["holds"] for f in data["findings"])
-    assert [w["car"]["certified"]["proved"] for w in data["weights"]] == [1.0, 0.0]
+    proved = [[w[f"{d}-car design, car"]["certified"]["proved"] for w in data["weights"]] for d in ("half", "full")]
+    assert proved == [[1.0, 0.0], [1.0, 1.0]]
     figures = sorted(path.name for path in tmp_path.glob("*.svg"))
     assert figures == [f"stabilization-{n}.svg" for n in ("08-L14", "09-motion", "10-forces", "limit", "printed")]
     with pytest.raises(InputError, match="wanted a folder, got a file"):

@@ -151,6 +151,16 @@ def quadrature(regulator: Regulator, t: Array, x: Array, u: Array) -> float:
     return float(simpson(regulator.running_cost(x, u), x=t))
 
 
+def modal_reach(A: Array, B: Array) -> float:
+    """Least |wᴴB| / |w| |B| over the left eigenvectors w of A: how far the control reaches the mode it reaches least.
+
+    0 if a mode is out of reach, and with eigenvalues all different only then (Popov, Belevitch, Hautus): (A, B) is
+    not controllable. A measure of the coordinates as they are; here SI units.
+    """
+    _, w = np.linalg.eig(A.T)
+    return float(np.linalg.norm(w.T @ B, axis=1).min() / np.linalg.norm(B, 2))
+
+
 def energy_to_rest(A: Array, B: Array, x0: Array, span: float) -> float:
     """Least ∫ uᵀu dt that brings x' = A x + B u from x0 to rest in the time `span` [s]: what control must spend.
 
