@@ -118,6 +118,9 @@ def test_a_stored_design_is_read_back_bit_for_bit(default_design: Design, tmp_pa
 
 def test_control_acts_from_the_come_down_of_the_last_wheel_to_T(default_design: Design) -> None:
     x = [0.01] * 14
+    whole = FullCar()
+    full = control_law(ControlParameters(model=whole, tau0=0.02), design(whole, infinite=False, span=2.0))
+    assert full(0.319, x) == full(2.3, x) == (0.0, 0.0, 0.0, 0.0) != full(2.29, x)
     law = control_law(ControlParameters(tau0=0.02), default_design)
     assert law(0.319, x) == law(2.3, x) == (0.0, 0.0, 0.0, 0.0)
     assert law(0.32 - 1e-12, x) != (0.0, 0.0, 0.0, 0.0) != law(2.299, x)
@@ -131,6 +134,24 @@ def test_finite_and_infinite_laws_differ_only_near_the_end(default_design: Desig
     finite, infinite = (control_law(ControlParameters(horizon=h), default_design) for h in ("finite", "infinite"))
     assert_allclose(finite(0.4, x), infinite(0.4, x), rtol=1e-3)
     assert np.abs(np.array(finite(2.29, x))).max() < 0.1 * np.abs(np.array(infinite(2.29, x))).max()
+
+
+def test_the_gain_at_a_time_is_that_of_the_time_to_go(
+    default_design: Design, matrices: tuple[Array, Array, Array, Array]
+) -> None:
+    """u(t) = −R⁻¹ Bᵀ L(T − t) x shortly before T, where the gain changes the most."""
+    x, T = np.random.default_rng(6).normal(size=14).tolist(), 1.7
+    law = control_law(ControlParameters(T=T), default_design)
+    seen = half_car_state(x[0], x[2], x[7], x[9])
+    for left in (0.02, 0.07, 0.15):
+        L = finite_horizon(*matrices, np.array([0.0, left]))[-1]
+        assert_allclose(law(T - left, x), strut_forces((-matrices[1].T @ L @ seen).tolist()), rtol=1e-5)
+
+
+def test_the_weights_of_the_half_car_are_those_of_its_cost() -> None:
+    car = HalfCar(lam=3e9, H1=1.7)
+    assert_allclose(car.Q, 3e9 * np.diag([1.0, 1.7**2, 0.0, 0.0]))
+    assert_allclose(car.R, np.eye(2))
 
 
 @pytest.mark.parametrize(

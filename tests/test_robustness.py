@@ -9,11 +9,11 @@ from typing import Any
 import control
 import numpy as np
 import pytest
-from flint import arb_mat
+from flint import arb_mat, fmpq
 from numpy.testing import assert_allclose
 
 from analysis.car import car_form
-from analysis.stabilization import study
+from analysis.stabilization import certified, study
 from analysis.stabilization.certified import _is_positive, around, certify, closed_loop, growth
 from analysis.stabilization.full_car import VARIED, car_plant, full_gain, half_car_plant, strut_gain, varied_values
 from analysis.stabilization.half_car import corrected
@@ -269,6 +269,21 @@ def test_a_box_that_is_not_stable_is_never_proved() -> None:
     assert 0.2 < found.unstable <= 0.25
     assert found.witness is not None
     assert found.witness["b"] <= 0.0
+
+
+def test_what_decides_is_the_comparison_in_balls(monkeypatch: pytest.MonkeyPatch) -> None:
+    """On the verge: −(P A + Aᵀ P) is singular at b = 0, which doubles cannot tell from a tiny damping."""
+    c, P = fmpq(1), arb_mat([[1, 0], [0, 1]])
+    assert not certified._decreases(damped, arb_mat([[0, 0]]), P, {"c": c, "b": fmpq(0)})
+    assert certified._decreases(damped, arb_mat([[0, 0]]), P, {"c": c, "b": fmpq(1, 10**30)})
+    assert not certified._decreases(damped, arb_mat([[0, 0]]), P, {"c": c, "b": fmpq(-1, 10**30)})
+    monkeypatch.setattr(certified, "_decreases", lambda *_: False)
+    assert certify(pendulum, NO_GAIN, around({"c": 1.0, "b": 1.0}, 0.1), budget=5).proved == 0.0
+
+
+def damped(values: Mapping[str, Any]) -> Any:
+    """Two decays, of rates b and c."""
+    return [[-values["b"], 0.0], [0.0, -values["c"]]], [[0.0], [1.0]]
 
 
 def test_a_proof_ends_with_its_budget() -> None:

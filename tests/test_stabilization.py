@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 from half_car_run import cost, half_car_run
+from matplotlib.figure import Figure
 from numpy.testing import assert_allclose
 from orders import observed_order
 from scipy.integrate import solve_ivp
@@ -21,6 +22,7 @@ from analysis.errors import InputError
 from analysis.methods.linear_response import linear_response
 from analysis.methods.signals import Piece, Signal
 from analysis.stabilization import document, study
+from analysis.stabilization.drawings import subjects
 from analysis.stabilization.half_car import (
     axle_road,
     come_down,
@@ -190,6 +192,16 @@ def test_the_motion_over_the_bump_is_that_of_an_integrator(x0: Array) -> None:
     assert_allclose(x0, x, atol=1e-11 * np.abs(x).max())
 
 
+def test_a_road_that_moves_as_a_rigid_plane_acts_as_the_body_moving_the_other_way(rng: np.random.Generator) -> None:
+    """C(t) of (4.1) from A: a road that rises by z and tilts by φ, z_A = z + aφ and z_B = z − bφ, pulls as −(z, φ)."""
+    car = HalfCar(a=1.3, b=0.8, c1=11e3, c2=17e3, b1=900.0, b2=1500.0)
+    z, phi, dz, dphi = rng.normal(size=4)
+    w = [z + car.a * phi, z - car.b * phi, dz + car.a * dphi, dz - car.b * dphi]
+    against = np.array(car.A) @ [z, phi, dz, dphi]
+    assert_allclose((excitation(car) @ w)[2:], -against[2:], rtol=1e-12)
+    assert not excitation(car)[:2].any()
+
+
 @pytest.mark.parametrize("lam", WEIGHTS)
 def test_riccati_and_pontryagin_agree(lam: float, x0: Array, times: Array) -> None:
     arcs = [way(regulator(lam), x0, times) for way in WAYS]
@@ -327,10 +339,35 @@ def test_the_printed_half_car_diverges_without_control(times: Array) -> None:
     assert np.abs(over_the_bump(corrected(CAR), ROAD, np.array([5.0]))).max() < 1e-6
 
 
+@pytest.fixture(scope="module")
+def result() -> study.Study:
+    """The study at the chosen weight and at one that the car with its wheels does not stand."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(study, "WEIGHTS", (CAR.lam, 1e13))
+        return study.study()
+
+
+def test_the_figures_show_what_their_axes_say(result: study.Study) -> None:
+    """Figure 8: L14; 9: z [mm] and φ [mrad], without control first; 10: u1, u2 [N]; in the default weight's red."""
+    arc, L = result.default.arc, result.default.L
+    free = 1e3 * result.free["corrected"]
+    shown = {"08-L14": [[L[:, 0, 3]], [L[:, 0, 3] / np.abs(L[:, 0, 3]).max()]],
+             "09-motion": [[free[k], 1e3 * arc.x[k]] for k in (0, 1)],
+             "10-forces": [[arc.u[0]], [arc.u[1]]]}  # fmt: skip
+    labels = ("L_{14}", "L_{14}"), ("z$ [mm]", "varphi$ [mrad]"), ("u_1$ [N], front", "u_2$ [N], rear")
+    for (name, panels), words in zip(shown.items(), labels, strict=True):
+        (subject,) = (s for s in subjects(result) if name in s.file)
+        for panel, lines, label in zip(subject.panels, panels, words, strict=True):
+            ax = panel(Figure().subplots())
+            assert label in ax.get_ylabel()
+            for line, expected in zip(ax.get_lines(), lines, strict=True):
+                assert_allclose(line.get_ydata(), expected, rtol=1e-6, atol=1e-9 * np.abs(expected).max())
+
+
 def test_the_command_writes_table_json_and_figures(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, result: study.Study
 ) -> None:
-    monkeypatch.setattr(study, "WEIGHTS", (CAR.lam, 1e13))
+    monkeypatch.setattr(document, "study", lambda progress: result)
     assert document.run(tmp_path) == 0
     said = capsys.readouterr().out
     assert "FAILS" not in said
