@@ -7,11 +7,14 @@ import subprocess
 import sys
 import zipfile
 from pathlib import Path
+from time import process_time
 from typing import Any
 
 import numpy as np
 import pytest
 from conftest import ROOT
+from fmpy import extract
+from host import DISCARD, OK, Host
 from numpy.testing import assert_allclose
 from scipy.linalg import expm, solve_continuous_are
 
@@ -166,6 +169,35 @@ def test_the_slave_refuses_bad_parameters_by_name(parameters: dict[str, float], 
         slave.exit_initialization_mode()
 
 
+@pytest.fixture(scope="module")
+def folder(dist: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return Path(extract(dist / "LqrController.fmu", tmp_path_factory.mktemp("controller")))
+
+
+@pytest.mark.parametrize(
+    ("T", "horizon", "t", "status"),
+    [
+        (0.302, "finite", 0.295, DISCARD),  # over all of the control, from 0.3 s on
+        (0.302, "finite", 0.3, DISCARD),
+        (0.302, "finite", 0.28, OK),  # does not meet it
+        (0.302, "finite", 0.31, OK),
+        (0.31, "finite", 0.3, OK),  # just one step
+        (0.302, "infinite", 0.295, OK),
+    ],
+)
+def test_a_step_longer_than_the_whole_control_is_refused_and_a_shorter_one_is_not(
+    folder: Path, T: float, horizon: str, t: float, status: int
+) -> None:
+    host = Host(folder)
+    assert host.set({"tau0": 0.0, "T": T}) == host.set_string(host.reference["horizon"], horizon) == OK
+    assert host.start(t) == OK
+    assert host.step(t, 0.01) == status
+    if status == DISCARD:
+        assert "T = 0.302 s: wanted at least a step of 0.01 s of control, got 0.002 s from 0.3 s on" in str(host.log)
+        assert host.step(t, 0.002) == OK
+    host.free()
+
+
 def test_a_design_that_needs_missing_packages_says_what_to_install() -> None:
     """In a Python that cannot import numpy, the stored design works and another one is refused with the remedy."""
     code = (
@@ -222,5 +254,25 @@ def test_a_control_too_fast_for_any_table_is_refused_with_the_reason() -> None:
     undamped = HalfCar(lam=0.0, b1=0.0, b2=0.0)  # L = 0 for ever, but nothing says so
     with pytest.raises(ParameterError, match=r"b1 = 0\.0 N\.s/m.*lambda = 0\.0 .* no stabilizing solution"):
         design(undamped, infinite=False, span=1e5)
-    with pytest.raises(ParameterError, match=r"^b1 = 0\.0 .*lambda = 0\.0 .* imaginary axis"):
+    with pytest.raises(ParameterError, match=r"^b1 = 0\.0 .*lambda = 0\.0 .* no stabilizing solution"):
         design(undamped, infinite=True, span=None)
+    with pytest.raises(ParameterError, match=r"^b1 = 0\.0 .*lambda = 1e-20 .* imaginary axis"):
+        design(HalfCar(lam=1e-20, b1=0.0, b2=0.0), infinite=True, span=None)
+    with pytest.raises(ParameterError, match=r"^c1 = 1e\+16 N/m: .* no stabilizing solution in double precision"):
+        design(HalfCar(c1=1e16), infinite=True, span=None)
+
+
+def test_without_weights_a_damped_car_is_left_alone() -> None:
+    for car in (HalfCar(lam=0.0), FullCar(lam=0.0)):
+        made = design(car, infinite=True, span=1.0)
+        assert made.infinite is not None and made.finite is not None
+        assert not any(made.infinite)
+        assert not any(made.finite.gain(0.5))
+
+
+def test_the_design_of_14_states_takes_well_under_a_second() -> None:
+    """Measured: 0.05 s of CPU time for the finite horizon, 0.01 s for the infinite one."""
+    design(FullCar(lam=2e10), infinite=True, span=2.0)  # imports
+    before = process_time()
+    design(FullCar(), infinite=True, span=2.0)
+    assert process_time() - before < 0.5

@@ -10,6 +10,7 @@ from scipy.interpolate import BSpline, make_interp_spline
 from scipy.linalg import expm
 
 from fmu_src.controller.riccati import finite_horizon, infinite_horizon
+from fmu_src.quantities import ParameterError
 
 from ..errors import InputError
 from ..methods.polynomials import Array
@@ -123,7 +124,7 @@ def stationary(regulator: Regulator) -> tuple[Array, Array]:
     """
     try:
         return infinite_horizon(regulator.A, regulator.B, regulator.Q, regulator.R)
-    except np.linalg.LinAlgError as error:
+    except (np.linalg.LinAlgError, ParameterError) as error:
         raise InputError(f"no control u = K x is optimal for ever: {error}") from error
 
 
