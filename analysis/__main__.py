@@ -112,7 +112,9 @@ def _parser() -> argparse.ArgumentParser:
     verb.set_defaults(do=_spatial)
 
     verb = verbs.add_parser("stabilize", help="optimal stabilization of section 4 and its robustness; needs no run")
-    verb.add_argument("-o", "--out", type=Path, metavar="DIR", help="also write stabilization.json and figures there")
+    verb.add_argument(
+        "-o", "--out", type=Path, metavar="DIR", help="also write stabilization.md, .json and figures there"
+    )
     verb.set_defaults(do=_stabilize)
     return parser
 

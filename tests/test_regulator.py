@@ -113,6 +113,10 @@ def test_the_effort_to_rest_has_its_closed_form() -> None:
         energy_to_rest(DOUBLE, np.array([[0.0], [1.0]]), np.array([0.3, 0.0]), 2.0), 12 * 0.3**2 / 8, rtol=1e-10
     )
     assert energy_to_rest(DOUBLE, np.zeros((2, 1)), np.array([0.3, 0.0]), 2.0) == np.inf
+    turn = np.array([[0.6, -0.8], [0.8, 0.6]])  # two decays of which the control reaches one, in turned coordinates
+    A, B = turn @ np.diag([-1.0, -2.0]) @ turn.T, turn @ np.array([[1.0], [0.0]])
+    assert energy_to_rest(A, B, np.array([0.3, 0.1]), 2.0) == np.inf
+    assert modal_reach(A, B) < 1e-14
 
 
 def test_the_reach_of_the_weakest_mode_has_its_closed_form_and_is_0_where_a_mode_is_out_of_reach() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 from dataclasses import replace
 from pathlib import Path
@@ -223,3 +224,15 @@ def test_a_run_beside_that_cannot_be_simulated_is_named_and_left_out(
     said = capsys.readouterr().err
     assert "(bump, control on)" in said and "(bump, full-car design)" in said
     assert not any(tmp_path.iterdir())
+
+
+def test_the_verb_run_writes_the_runs_beside_it(dist: Path, tmp_path: Path) -> None:
+    few = ["body.heave", "body.roll"]  # too few to be checked
+    text = f"[simulation]\nstop_time = 0.4\nrecord = {json.dumps(few)}\n[parameters]\nenabled = false\n"
+    (tmp_path / "short.toml").write_text(text)
+    assert main(["run", str(tmp_path / "short.toml"), "-o", str(tmp_path / "run")]) == 0
+    folders = [tmp_path / "run" / name for name in ("", COUNTERPART, OTHER_DESIGN)]
+    found = [read_run(folder).parameters for folder in folders]
+    assert [p["enabled"] for p in found] == [False, True, True]
+    assert [p["design"] for p in found] == ["half-car", "half-car", "full-car"]
+    assert (tmp_path / "run" / "report.html").is_file()

@@ -281,6 +281,11 @@ def test_the_command_writes_table_json_and_figures(
     assert proved == [[1.0, 0.0], [1.0, 1.0]]
     figures = sorted(path.name for path in tmp_path.glob("*.svg"))
     assert figures == [f"stabilization-{n}.svg" for n in ("08-L14", "09-motion", "10-forces", "limit", "printed")]
+    page = (tmp_path / document.PAGE).read_text(encoding="utf-8")
+    assert document.text(result) in page and "holds: " in page
+    for subject in subjects(result):
+        assert f"({subject.file})" in page and subject.caption() in page
+    assert "λ = 1e+10 N²/m², H1 = 1 m, T = 2.3 s are this project's choice" in page
     with pytest.raises(InputError, match="wanted a folder, got a file"):
         document.run(tmp_path / document.FILE)
 

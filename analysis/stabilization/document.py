@@ -1,9 +1,9 @@
-"""The study written down: a table for the terminal, JSON, findings and figures."""
+"""The study written down: tables for the terminal, JSON, findings, figures, and a page that shows them all."""
 
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -11,21 +11,21 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError
-from ..figures import readable, render
+from ..figures import Subject, readable, render
 from ..files import write_whole
 from ..findings import Finding
 from .certified import Certified
-from .drawings import subjects
+from .drawings import CHOICE, subjects
 from .margins import Margins
 from .study import SPREAD, Robustness, Solution, Study, Weighted, study
 
-FILE = "stabilization.json"
+FILE, PAGE = "stabilization.json", "stabilization.md"
 ROBUST = ("λ", "design", "plant", "growth", "worst", "gain ×", "phase", "σ(I + L)", "disk", "delay", "proved stable")
 WEAKEST = (
     "weakest mode: least |wᴴB| / |w||B| over the left eigenvectors w of A, in SI units; 0 would be: not controllable. "
     "J and forces are from x(t_B2) of each one's own motion over the bump."
 )
-DEFAULT = "λ = 1e10 N²/m², H1 = 1 m, T = 2.3 s are this project's choice: the paper gives none."
+DEFAULT = f"{CHOICE} are this project's choice: the paper gives none."
 
 
 def run(folder: Path | None) -> int:
@@ -46,11 +46,13 @@ def run(folder: Path | None) -> int:
 
 
 def write(result: Study, folder: Path) -> list[Path]:
-    """stabilization.json and the figures, each whole; returns their paths."""
+    """stabilization.json, the figures, and stabilization.md, which shows them with the tables; returns their paths."""
     folder.mkdir(parents=True, exist_ok=True)
+    drawn = subjects(result)
     contents = {
         FILE: (json.dumps(as_json(result), indent=1, ensure_ascii=False) + "\n").encode(),
-        **{subject.file: render(subject) for subject in subjects(result)},
+        **{subject.file: render(subject) for subject in drawn},
+        PAGE: page(result, drawn).encode(),
     }
     for name, content in contents.items():
         write_whole(folder / name, content)
@@ -159,6 +161,14 @@ def _finite(value: float) -> float | None:
 
 
 # ------------------------------------------------------------------ text
+def page(result: Study, drawn: Sequence[Subject]) -> str:
+    """The study as Markdown: what is printed, and each figure with its caption."""
+    figures = [f"![{each.title}]({each.file})\n\n**{each.title}.** {each.caption()}\n" for each in drawn]
+    claims = [f"- {finding.line}" for finding in findings(result)]
+    parts = ["# Optimal stabilization (§4)", f"```\n{text(result)}\n```", *figures, "## Findings", "\n".join(claims)]
+    return "\n\n".join(parts) + "\n"
+
+
 def text(result: Study) -> str:
     """The study for a terminal."""
     models = (result.default, *result.printed)

@@ -165,12 +165,11 @@ def modal_reach(A: Array, B: Array) -> float:
 def energy_to_rest(A: Array, B: Array, x0: Array, span: float) -> float:
     """Least ∫ uᵀu dt that brings x' = A x + B u from x0 to rest in the time `span` [s]: what control must spend.
 
-    (e^{AT} x0)ᵀ W⁻¹ (e^{AT} x0) with the controllability Gramian W; infinite where W is singular.
+    (e^{AT} x0)ᵀ W⁻¹ (e^{AT} x0) with the controllability Gramian W; infinite where W is singular to round-off.
     """
     n = len(A)
     flow = expm(np.block([[-A, B @ B.T], [np.zeros((n, n)), A.T]]) * span)
     gramian, end = flow[n:, n:].T @ flow[:n, n:], flow[n:, n:].T @ x0  # C. F. Van Loan, IEEE TAC 23 (1978) 395
-    try:
-        return float(end @ np.linalg.solve(gramian, end))
-    except np.linalg.LinAlgError:
+    if np.linalg.matrix_rank(gramian) < n:
         return float("inf")
+    return float(end @ np.linalg.solve(gramian, end))
