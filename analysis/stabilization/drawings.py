@@ -42,7 +42,7 @@ def subjects(result: Study) -> list[Subject]:
         subject("08-L14", "The history of L₁₄", f"As figure 8 of the paper; {CHOICE} (our choice). Below, by λ.",
                 [partial(_L14, result), partial(_L14_by_weight, shown)], behind),
         subject("09-motion", "Heave and pitch of the half car",
-                f"As figure 9 of the paper; {CHOICE} (our choice). Pitch is positive front up, as in the paper's section 4.",
+                f"As figure 9 of the paper; {CHOICE} (our choice). Pitch is positive front up, as in section 4.",
                 [partial(_motion, result, shown, *which) for which in COORDINATES], partial(_window, 0.0, end)),
         subject("10-forces", "Control forces of the half car",
                 f"As figure 10 of the paper; {CHOICE} (our choice). Per axle, positive down on the body.",
