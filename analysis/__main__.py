@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import dataclasses
 import os
 import signal
 import sys
@@ -15,18 +14,8 @@ from typing import NoReturn
 from fmu_src.quantities import ParameterError
 
 from .errors import CosimError, InputError
-from .scenario import Scenario, built_in_scenarios, read_scenario
-from .trajectory import (
-    CERTIFICATE,
-    COUNTERPART,
-    FINDINGS,
-    RECORD,
-    Run,
-    new_run_folder,
-    read_record,
-    read_run,
-    write_run,
-)
+from .scenario import built_in_scenarios, read_scenario
+from .trajectory import CERTIFICATE, FINDINGS, RECORD, Run, new_run_folder, read_record, read_run, write_run
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -56,7 +45,7 @@ def _parser() -> argparse.ArgumentParser:
     verbs = parser.add_subparsers(required=True, metavar="VERB")
     scenario = f"a .toml file, the run.json of an earlier run, or one of: {', '.join(built_in_scenarios())}"
 
-    verb = verbs.add_parser("run", help="simulate a scenario and its counterpart, check, and write the report")
+    verb = verbs.add_parser("run", help="simulate a scenario and those beside it, check, and write the report")
     verb.add_argument("scenario", help=scenario)
     verb.add_argument("-o", "--out", type=Path, help="run folder (default: runs/SCENARIO)")
     verb.set_defaults(do=_run)
@@ -124,7 +113,9 @@ def _parser() -> argparse.ArgumentParser:
     verb.set_defaults(do=_spatial)
 
     verb = verbs.add_parser("stabilize", help="optimal stabilization of section 4 and its robustness; needs no run")
-    verb.add_argument("-o", "--out", type=Path, metavar="DIR", help="also write stabilization.json and figures there")
+    verb.add_argument(
+        "-o", "--out", type=Path, metavar="DIR", help="also write stabilization.md, .json and figures there"
+    )
     verb.set_defaults(do=_stabilize)
     return parser
 
@@ -154,6 +145,7 @@ def _simulate(options: argparse.Namespace) -> int:
 
 
 def _run(options: argparse.Namespace) -> int:
+    from .beside import simulate_beside
     from .check import lacking
     from .cosimulation import simulate
     from .report import write_report
@@ -166,7 +158,7 @@ def _run(options: argparse.Namespace) -> int:
         run = simulate(scenario, progress=True)
         _compare_fmus(options.scenario, run)
         write_run(run, folder)
-        _simulate_counterpart(scenario, run, folder / COUNTERPART)
+        simulate_beside(scenario, run, folder)
         _certify_shortly(run, folder)
         verdict = 0
         if missing := lacking(run):
@@ -205,21 +197,6 @@ def _compare_fmus(scenario: str, run: Run) -> None:
         before, now = read_record(Path(scenario))["fmus"], run.record["fmus"]
         if others := [name for name in now if before.get(name, {}).get("sha256") != now[name]["sha256"]]:
             print(f"not the FMUs of {scenario}: {', '.join(others)}; results may differ", file=sys.stderr)
-
-
-def _simulate_counterpart(scenario: Scenario, run: Run, folder: Path) -> None:
-    """The same scenario with the controller switched the other way, for the figures that compare."""
-    from .cosimulation import simulate
-
-    switched = {**scenario.parameters, "enabled": not run.parameters["enabled"]}
-    name = f"{scenario.name}, control {'on' if switched['enabled'] else 'off'}"
-    try:
-        other = simulate(dataclasses.replace(scenario, name=name, parameters=switched), progress=True)
-    except CosimError as error:
-        print(f"no run with the controller switched the other way for comparison: {error}", file=sys.stderr)
-        return
-    folder.mkdir()
-    write_run(other, folder)
 
 
 def _check(options: argparse.Namespace) -> int:

@@ -6,6 +6,7 @@ import base64
 import html
 import json
 import re
+from collections.abc import Iterable
 from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any
@@ -14,8 +15,7 @@ import numpy as np
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
 from fmu_src.controller.lqr_controller import LqrController
-from fmu_src.quantities import CORNER_WORDS, CORNERS, PARAMETERS, STATES, TYRE_FORCES, Quantity
-from fmu_src.road.profiles import HARMONICS
+from fmu_src.quantities import CORNER_WORDS, PARAMETERS, STATES, TYRE_FORCES, Quantity
 from fmu_src.road.road_excitation import RoadExcitation
 from fmu_src.vehicle.vehicle7dof import Vehicle7DOF
 
@@ -25,7 +25,9 @@ from .figures import READING, readable
 from .files import write_whole
 from .findings import Finding
 from .ride import BAND, lacking, ride, table
-from .trajectory import COUNTERPART, FINDINGS, RECORD, Run, Trajectory, read_run
+from .run_figures import is_controlled
+from .run_words import control_words, summary
+from .trajectory import COUNTERPART, FINDINGS, OTHER_DESIGN, RECORD, Run, Trajectory, read_run
 from .tyres import static_loads, time_below_zero, tyre_loads
 
 REPORT = "report.html"
@@ -74,9 +76,10 @@ class Parameter:
 
 @dataclass(frozen=True, slots=True)
 class RideTable:
-    """How runs ride: a heading for each, and rows of words, unit and one number for each."""
+    """How runs ride: for each a heading and its control in words, and rows of words, unit and one number for each."""
 
     headings: list[str]
+    controls: list[str]
     rows: list[tuple[str, str, list[float]]]
 
 
@@ -87,10 +90,10 @@ def write_report(run_folder: Path) -> Path:
     """
     run = read_run(run_folder)
     _check_record(run.record, run_folder / RECORD)
-    there = run_folder / COUNTERPART
-    counterpart = read_run(there) if there.is_dir() else None
-    if counterpart:
-        _check_record(counterpart.record, there / RECORD)
+    others = {name: read_run(run_folder / name) for name in (COUNTERPART, OTHER_DESIGN) if (run_folder / name).is_dir()}
+    for name, other in others.items():
+        _check_record(other.record, run_folder / name / RECORD)
+    counterpart = others.get(COUNTERPART)
     findings = read_findings(run_folder / FINDINGS)
     certified = run_figures.certified(run_folder)
     entries = [*run_figures.draw_all(run, counterpart, run_folder), *certified]
@@ -105,7 +108,7 @@ def write_report(run_folder: Path) -> Path:
         left_out=run_figures.left_out(run, counterpart),
         counterpart=counterpart is not None,
         certified=bool(certified),
-        rides=ride_columns(run, counterpart),
+        rides=ride_table(run, others.values()),
         parameters=parameter_table(run),
         band=BAND,
         fmus=run.record["fmus"],
@@ -166,74 +169,20 @@ def _as_data(path: Path) -> str:
 
 
 # ------------------------------------------------------------------ what the page says
-def summary(run: Run) -> str:
-    """The scenario in one line: road, speed, times, coupling, control."""
-    scenario = run.record["scenario"]
-    (v0,) = run.reals("v0")
-    times = f"{run.trajectory.time[0]:g} s to {run.trajectory.time[-1]:g} s"
-    if isinstance(scenario.get("step"), (int, float)):
-        times += f" in steps of {1e3 * scenario['step']:g} ms"
-    coupling = f"coupling {scenario.get('coupling', 'not recorded')}"
-    return " · ".join((road_words(run), f"{v0:g} m/s", times, coupling, control_words(run)))
-
-
-def control_words(run: Run) -> str:
-    """Whether the controller is on, with which horizon, and from when."""
-    if not run_figures.is_controlled(run):
-        return "controller off"
-    known = run.parameters
-    horizon = f"{known.get('horizon', 'unknown')} horizon"
-    if known.get("horizon") == "finite":
-        horizon += ", T = {:g} s".format(*run.reals("T"))
-    begin = "the come-down of the last wheel"
-    if known.get("activation") == "at t_on":
-        begin = "t = {:g} s".format(*run.reals("t_on"))
-    words = [f"{known['design']} design"] if "design" in known else []
-    return f"controller on ({', '.join([*words, horizon, *hardware_words(run)])}, from {begin})"
-
-
-def hardware_words(run: Run) -> list[str]:
-    """What stands between the law and the struts, if anything does."""
-    known, found = run.parameters, []
-    if known.get("actuators") == "semi-active":
-        found.append("semi-active")
-    if known.get("feedback") == "estimate":
-        found.append("from estimates")
-    for name, factor, text in (
-        ("force_limit", 1.0, "forces up to {:g} N"),
-        ("actuator_lag", 1e3, "lag {:g} ms"),
-        ("sample_time", 1e3, "samples every {:g} ms"),
-    ):
-        if known.get(name):
-            found.append(text.format(factor * run.reals(name)[0]))
-    return found
-
-
-def ride_columns(run: Run, counterpart: Run | None) -> RideTable | None:
-    """The table that compares a run with its counterpart; None without one, or where columns were not recorded."""
-    if counterpart is None or lacking(run) or lacking(counterpart):
+def ride_table(run: Run, others: Iterable[Run]) -> RideTable | None:
+    """The table that compares a run with those beside it, the passive car first; None without any, or where columns
+    were not recorded."""
+    runs = sorted([run, *others], key=lambda each: (is_controlled(each), each.parameters.get("design") == "full-car"))
+    if len(runs) < 2 or any(lacking(each) for each in runs):
         return None
-    both = [run, counterpart]
-    return RideTable([control_words(each) for each in both], table([ride(each) for each in both]))
+    headings = [_heading(each) + (" (this run)" if each is run else "") for each in runs]
+    return RideTable(headings, [control_words(each) for each in runs], table([ride(each) for each in runs]))
 
 
-def road_words(run: Run) -> str:
-    """The road in words, and under which wheels it is uneven if not under all."""
-    known = run.parameters
-    profile = known.get("profile", "not recorded")
-    if profile == "flat":
-        return "flat road"
-    A, Lambda = run.reals("A", "Lambda")
-    names = [name for name in HARMONICS if known.get(name)]
-    series = zip(names, run.reals(*names), strict=True)
-    what = {
-        "bump": f"half-sine bump, {1e3 * A:g} mm high and {Lambda / 2:g} m long",
-        "sine": f"endless sine road, amplitude {1e3 * A:g} mm, wave length {Lambda:g} m",
-        "fourier": f"Fourier series on {Lambda:g} m, " + ", ".join(f"{name} = {1e3 * a:g} mm" for name, a in series),
-        "step": f"step of {1e3 * A:g} mm",
-    }.get(str(profile), f"road profile {profile}")
-    under = [words for corner, words in zip(CORNERS, CORNER_WORDS, strict=True) if known.get(f"excite_{corner}", True)]
-    return what if len(under) == len(CORNERS) else f"{what}, under {', '.join(under) or 'no wheel'} only"
+def _heading(run: Run) -> str:
+    if not is_controlled(run):
+        return "No control"
+    return f"{run.parameters.get('design', 'unknown')} design".capitalize()
 
 
 def extreme(trajectory: Trajectory, q: Quantity) -> Extreme:

@@ -155,7 +155,8 @@ def _comparison(controlled: Trajectory, uncontrolled: Trajectory) -> Subject:
         caption=lambda: (
             "As figure 9 of the paper. Red: optimal stabilization; blue: without control forces. Heave z, up; pitch φ, "
             "positive nose down (the paper's section 4 has it front up); below them roll ψ, which the half-car design "
-            "does not see. Here the car is the full one, with seven degrees of freedom; the paper's is the half car."
+            "does not see. Here the car is the full one, with seven degrees of freedom; the paper's is the half car: "
+            "python -m analysis stabilize draws that, and figure 8."
         ),
         panels=[partial(plot_comparison, controlled, uncontrolled, q) for q in (Z, PHI, PSI)],
         sources=(controlled, uncontrolled),

@@ -20,7 +20,7 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
-from fmu_src.controller.law import control_parameters
+from fmu_src.controller.law import SNAP, control_parameters
 from fmu_src.controller.lqr_controller import LqrController
 from fmu_src.quantities import PARAMETERS, STATES, Choice, ParameterError, Quantity
 from fmu_src.road.road_excitation import RoadExcitation
@@ -244,7 +244,7 @@ class _Check:
         """Whether control lasts a step; what else may be wrong with it, the controller says in its own words."""
         with contextlib.suppress(ParameterError):
             p = control_parameters(s.parameters)
-            if p.enabled and p.end - p.begin < s.step:
+            if p.enabled and p.end - p.begin < s.step - SNAP:
                 self.fault(
                     "parameters",
                     "T",

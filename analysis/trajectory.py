@@ -24,8 +24,8 @@ from fmu_src.quantities import PARAMETERS
 from .errors import InputError
 
 Array = NDArray[np.float64]
-CSV, RECORD, FINDINGS, COUNTERPART = "trajectory.csv", "run.json", "findings.json", "counterpart"
-CERTIFICATE = "certificate.json"
+CSV, RECORD, FINDINGS, CERTIFICATE = "trajectory.csv", "run.json", "findings.json", "certificate.json"
+COUNTERPART, OTHER_DESIGN = "counterpart", "other-design"  # folders of the runs beside a run, see `beside.py`
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -7,11 +7,14 @@ import subprocess
 import sys
 import zipfile
 from pathlib import Path
+from time import process_time
 from typing import Any
 
 import numpy as np
 import pytest
 from conftest import ROOT
+from fmpy import extract
+from host import DISCARD, OK, Host
 from numpy.testing import assert_allclose
 from scipy.linalg import expm, solve_continuous_are
 
@@ -118,6 +121,9 @@ def test_a_stored_design_is_read_back_bit_for_bit(default_design: Design, tmp_pa
 
 def test_control_acts_from_the_come_down_of_the_last_wheel_to_T(default_design: Design) -> None:
     x = [0.01] * 14
+    whole = FullCar()
+    full = control_law(ControlParameters(model=whole, tau0=0.02), design(whole, infinite=False, span=2.0))
+    assert full(0.319, x) == full(2.3, x) == (0.0, 0.0, 0.0, 0.0) != full(2.29, x)
     law = control_law(ControlParameters(tau0=0.02), default_design)
     assert law(0.319, x) == law(2.3, x) == (0.0, 0.0, 0.0, 0.0)
     assert law(0.32 - 1e-12, x) != (0.0, 0.0, 0.0, 0.0) != law(2.299, x)
@@ -133,6 +139,24 @@ def test_finite_and_infinite_laws_differ_only_near_the_end(default_design: Desig
     assert np.abs(np.array(finite(2.29, x))).max() < 0.1 * np.abs(np.array(infinite(2.29, x))).max()
 
 
+def test_the_gain_at_a_time_is_that_of_the_time_to_go(
+    default_design: Design, matrices: tuple[Array, Array, Array, Array]
+) -> None:
+    """u(t) = −R⁻¹ Bᵀ L(T − t) x shortly before T, where the gain changes the most."""
+    x, T = np.random.default_rng(6).normal(size=14).tolist(), 1.7
+    law = control_law(ControlParameters(T=T), default_design)
+    seen = half_car_state(x[0], x[2], x[7], x[9])
+    for left in (0.02, 0.07, 0.15):
+        L = finite_horizon(*matrices, np.array([0.0, left]))[-1]
+        assert_allclose(law(T - left, x), strut_forces((-matrices[1].T @ L @ seen).tolist()), rtol=1e-5)
+
+
+def test_the_weights_of_the_half_car_are_those_of_its_cost() -> None:
+    car = HalfCar(lam=3e9, H1=1.7)
+    assert_allclose(car.Q, 3e9 * np.diag([1.0, 1.7**2, 0.0, 0.0]))
+    assert_allclose(car.R, np.eye(2))
+
+
 @pytest.mark.parametrize(
     ("parameters", "said"),
     [({"T": 0.1}, "end of control after its start"), ({"lambda": -1.0}, "lambda = -1.0"), ({"v0": 0.0}, "v0 = 0.0")],
@@ -143,6 +167,35 @@ def test_the_slave_refuses_bad_parameters_by_name(parameters: dict[str, float], 
         slave.p[slave.reals.index(name)] = value
     with pytest.raises(RuntimeError, match=said):
         slave.exit_initialization_mode()
+
+
+@pytest.fixture(scope="module")
+def folder(dist: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return Path(extract(dist / "LqrController.fmu", tmp_path_factory.mktemp("controller")))
+
+
+@pytest.mark.parametrize(
+    ("T", "horizon", "t", "status"),
+    [
+        (0.302, "finite", 0.295, DISCARD),  # over all of the control, from 0.3 s on
+        (0.302, "finite", 0.3, DISCARD),
+        (0.302, "finite", 0.28, OK),  # does not meet it
+        (0.302, "finite", 0.31, OK),
+        (0.31, "finite", 0.3, OK),  # just one step
+        (0.302, "infinite", 0.295, OK),
+    ],
+)
+def test_a_step_longer_than_the_whole_control_is_refused_and_a_shorter_one_is_not(
+    folder: Path, T: float, horizon: str, t: float, status: int
+) -> None:
+    host = Host(folder)
+    assert host.set({"tau0": 0.0, "T": T}) == host.set_string(host.reference["horizon"], horizon) == OK
+    assert host.start(t) == OK
+    assert host.step(t, 0.01) == status
+    if status == DISCARD:
+        assert "T = 0.302 s: wanted at least a step of 0.01 s of control, got 0.002 s from 0.3 s on" in str(host.log)
+        assert host.step(t, 0.002) == OK
+    host.free()
 
 
 def test_a_design_that_needs_missing_packages_says_what_to_install() -> None:
@@ -201,5 +254,25 @@ def test_a_control_too_fast_for_any_table_is_refused_with_the_reason() -> None:
     undamped = HalfCar(lam=0.0, b1=0.0, b2=0.0)  # L = 0 for ever, but nothing says so
     with pytest.raises(ParameterError, match=r"b1 = 0\.0 N\.s/m.*lambda = 0\.0 .* no stabilizing solution"):
         design(undamped, infinite=False, span=1e5)
-    with pytest.raises(ParameterError, match=r"^b1 = 0\.0 .*lambda = 0\.0 .* imaginary axis"):
+    with pytest.raises(ParameterError, match=r"^b1 = 0\.0 .*lambda = 0\.0 .* no stabilizing solution"):
         design(undamped, infinite=True, span=None)
+    with pytest.raises(ParameterError, match=r"^b1 = 0\.0 .*lambda = 1e-20 .* imaginary axis"):
+        design(HalfCar(lam=1e-20, b1=0.0, b2=0.0), infinite=True, span=None)
+    with pytest.raises(ParameterError, match=r"^c1 = 1e\+16 N/m: .* no stabilizing solution in double precision"):
+        design(HalfCar(c1=1e16), infinite=True, span=None)
+
+
+def test_without_weights_a_damped_car_is_left_alone() -> None:
+    for car in (HalfCar(lam=0.0), FullCar(lam=0.0)):
+        made = design(car, infinite=True, span=1.0)
+        assert made.infinite is not None and made.finite is not None
+        assert not any(made.infinite)
+        assert not any(made.finite.gain(0.5))
+
+
+def test_the_design_of_14_states_takes_well_under_a_second() -> None:
+    """Measured: 0.05 s of CPU time for the finite horizon, 0.01 s for the infinite one."""
+    design(FullCar(lam=2e10), infinite=True, span=2.0)  # imports
+    before = process_time()
+    design(FullCar(), infinite=True, span=2.0)
+    assert process_time() - before < 0.5

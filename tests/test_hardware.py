@@ -197,7 +197,7 @@ def loop_error(step: float, **parameters: Any) -> float:
 @pytest.mark.parametrize(
     "parameters",
     [
-        {"design": "full-car"},
+        {"design": "full-car", "T": 0.8},
         {"design": "full-car", "horizon": "infinite"},
         {"actuator_lag": 0.02},
         {"design": "full-car", "sample_time": 0.01, "actuator_lag": 0.02},

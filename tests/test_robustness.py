@@ -9,17 +9,19 @@ from typing import Any
 import control
 import numpy as np
 import pytest
-from flint import arb_mat
+from flint import arb_mat, fmpq
 from numpy.testing import assert_allclose
 
 from analysis.car import car_form
+from analysis.stabilization import certified, study
 from analysis.stabilization.certified import _is_positive, around, certify, closed_loop, growth
-from analysis.stabilization.full_car import VARIED, car_plant, half_car_plant, strut_gain, varied_values
+from analysis.stabilization.full_car import VARIED, car_plant, full_gain, half_car_plant, strut_gain, varied_values
 from analysis.stabilization.half_car import corrected
 from analysis.stabilization.margins import Margins, loop_margins, margins
 from analysis.stabilization.regulator import Regulator, stationary
-from analysis.stabilization.study import WEIGHTS, lost_at
+from analysis.stabilization.study import WEIGHTS, lost_at, robustness
 from fmu_src.controller.design import design
+from fmu_src.controller.fullcar import FullCar
 from fmu_src.controller.halfcar import HalfCar
 from fmu_src.controller.law import ControlParameters, control_law
 from fmu_src.vehicle.linear import linearized
@@ -89,6 +91,17 @@ def test_the_half_car_keeps_the_promise_and_the_car_with_wheels_does_not(sharp_m
     assert min(loop.up for loop in promised.loops) == np.inf
     assert sharp_margins.return_difference < 0.5
     assert min(loop.up for loop in sharp_margins.loops) < 10.0
+
+
+def test_the_full_car_design_keeps_the_promise_where_the_half_car_design_loses_the_car() -> None:
+    lam = 1e13
+    own = robustness(car_plant(CAR), full_gain(FullCar(lam=lam)), varied_values(CAR))
+    assert own.margins is not None
+    assert own.margins.return_difference > 1.0 - 1e-9
+    assert all(loop.up == np.inf and loop.phase >= 60.0 for loop in own.margins.loops)
+    assert own.certified.proved == 1.0
+    assert own.growth < own.worst < 0.0
+    assert growth(car_plant(CAR), strut_gain(gain_of(lam)), varied_values(CAR)) > 0.0
 
 
 # ------------------------------------------------------------------ against eigenvalues
@@ -173,6 +186,10 @@ def test_the_gain_by_struts_is_that_of_the_controller(rng: np.random.Generator) 
     gain = strut_gain(np.array(made.infinite).reshape(2, 4))
     for x in rng.normal(size=(5, 14)):
         assert_allclose(gain @ x, law(1.0, x.tolist()), rtol=1e-12)
+    whole = FullCar(lam=1e11)
+    law = control_law(ControlParameters(model=whole, horizon="infinite"), design(whole, infinite=True, span=None))
+    x = rng.normal(size=14)
+    assert_allclose(full_gain(whole) @ x, law(1.0, x.tolist()), rtol=1e-12)
 
 
 def test_the_closed_loop_is_that_of_the_standard_form() -> None:
@@ -204,6 +221,14 @@ def test_the_weight_from_which_wheels_make_the_control_unstable() -> None:
     assert WEIGHTS[0] < lam < WEIGHTS[-1]
     rates = [growth(car_plant(CAR), strut_gain(gain_of(f * lam)), varied_values(CAR)) for f in (0.99, 1.01)]
     assert rates[0] < 0.0 < rates[1]
+
+
+@pytest.mark.parametrize(("weights", "lost"), [((1e8, 1e9), np.inf), ((1e13, 1e14), 1e13)])
+def test_without_such_a_weight_it_is_infinite_and_from_the_first_on_the_first(
+    weights: tuple[float, ...], lost: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(study, "WEIGHTS", weights)
+    assert lost_at(HALF_CAR) == pytest.approx(lost)
 
 
 # ------------------------------------------------------------------ proved
@@ -244,6 +269,21 @@ def test_a_box_that_is_not_stable_is_never_proved() -> None:
     assert 0.2 < found.unstable <= 0.25
     assert found.witness is not None
     assert found.witness["b"] <= 0.0
+
+
+def test_what_decides_is_the_comparison_in_balls(monkeypatch: pytest.MonkeyPatch) -> None:
+    """On the verge: −(P A + Aᵀ P) is singular at b = 0, which doubles cannot tell from a tiny damping."""
+    c, P = fmpq(1), arb_mat([[1, 0], [0, 1]])
+    assert not certified._decreases(damped, arb_mat([[0, 0]]), P, {"c": c, "b": fmpq(0)})
+    assert certified._decreases(damped, arb_mat([[0, 0]]), P, {"c": c, "b": fmpq(1, 10**30)})
+    assert not certified._decreases(damped, arb_mat([[0, 0]]), P, {"c": c, "b": fmpq(-1, 10**30)})
+    monkeypatch.setattr(certified, "_decreases", lambda *_: False)
+    assert certify(pendulum, NO_GAIN, around({"c": 1.0, "b": 1.0}, 0.1), budget=5).proved == 0.0
+
+
+def damped(values: Mapping[str, Any]) -> Any:
+    """Two decays, of rates b and c."""
+    return [[-values["b"], 0.0], [0.0, -values["c"]]], [[0.0], [1.0]]
 
 
 def test_a_proof_ends_with_its_budget() -> None:

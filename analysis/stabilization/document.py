@@ -1,9 +1,9 @@
-"""The study written down: a table for the terminal, JSON, findings and figures."""
+"""The study written down: tables for the terminal, JSON, findings, figures, and a page that shows them all."""
 
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -11,16 +11,21 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError
-from ..figures import readable, render
+from ..figures import Subject, readable, render
 from ..files import write_whole
 from ..findings import Finding
 from .certified import Certified
-from .drawings import subjects
+from .drawings import CHOICE, subjects
 from .margins import Margins
 from .study import SPREAD, Robustness, Solution, Study, Weighted, study
 
-FILE = "stabilization.json"
-DEFAULT = "λ = 1e10 N²/m², H1 = 1 m, T = 2.3 s are this project's choice: the paper gives none."
+FILE, PAGE = "stabilization.json", "stabilization.md"
+ROBUST = ("λ", "design", "plant", "growth", "worst", "gain ×", "phase", "σ(I + L)", "disk", "delay", "proved stable")
+WEAKEST = (
+    "weakest mode: least |wᴴB| / |w||B| over the left eigenvectors w of A, in SI units; 0 would be: not controllable. "
+    "J and forces are from x(t_B2) of each one's own motion over the bump."
+)
+DEFAULT = f"{CHOICE} are this project's choice: the paper gives none."
 
 
 def run(folder: Path | None) -> int:
@@ -41,11 +46,13 @@ def run(folder: Path | None) -> int:
 
 
 def write(result: Study, folder: Path) -> list[Path]:
-    """stabilization.json and the figures, each whole; returns their paths."""
+    """stabilization.json, the figures, and stabilization.md, which shows them with the tables; returns their paths."""
     folder.mkdir(parents=True, exist_ok=True)
+    drawn = subjects(result)
     contents = {
         FILE: (json.dumps(as_json(result), indent=1, ensure_ascii=False) + "\n").encode(),
-        **{subject.file: render(subject) for subject in subjects(result)},
+        **{subject.file: render(subject) for subject in drawn},
+        PAGE: page(result, drawn).encode(),
     }
     for name, content in contents.items():
         write_whole(folder / name, content)
@@ -84,10 +91,13 @@ def findings(result: Study) -> list[Finding]:
         made.append(
             finding(f"{at}: rate of L(t) → L∞ over twice the slowest decay", "remark 4.1", a.fitted / a.rate, 1.0, 1e-3)
         )
-        if w.half.margins:
-            short = min(w.half.margins.return_difference - 1.0, 0.0)
-            made.append(finding(f"{at}: least singular value of I + L, below 1", "remark 4.1", short, 0.0, 1e-9))
+        for name, margins in (("half car", w.half.margins), ("car under its own design", w.full_on_car.margins)):
+            short = min(margins.return_difference - 1.0, 0.0) if margins else -1.0
+            claim = f"{at}: {name}: least singular value of I + L, below 1"
+            made.append(finding(claim, "remark 4.1", short, 0.0, 1e-9))
         made.append(finding(f"{at}: half car proved stable within ± 30 %", "(4.1)", w.half.certified.proved, 1.0, 0.0))
+        proved = w.full_on_car.certified.proved
+        made.append(finding(f"{at}: car under its own design proved stable within ± 30 %", "(3.10)", proved, 1.0, 0.0))
     return made
 
 
@@ -113,6 +123,7 @@ def _solution_json(s: Solution) -> dict[str, Any]:
         "cost by quadrature": s.measured,
         "largest control": s.peaks.tolist(),
         "rank of B": int(np.linalg.matrix_rank(s.model.B)),
+        "reach of the weakest mode": s.weakest,
         "growth of A": s.growth,
         "energy to rest": _finite(s.energy_to_rest),
     }
@@ -124,8 +135,7 @@ def _weighted_json(w: Weighted) -> dict[str, Any]:
         "cost": w.solution.cost,
         "largest control": w.solution.peaks.tolist(),
         "rate to the infinite horizon": {"expected": w.approach.rate, "fitted": w.approach.fitted},
-        "half car": _robustness_json(w.half),
-        "car": _robustness_json(w.car),
+        **{f"{design} design, {plant}": _robustness_json(r) for design, plant, r in _robustness(w)},
     }
 
 
@@ -151,6 +161,14 @@ def _finite(value: float) -> float | None:
 
 
 # ------------------------------------------------------------------ text
+def page(result: Study, drawn: Sequence[Subject]) -> str:
+    """The study as Markdown: what is printed, and each figure with its caption."""
+    figures = [f"![{each.title}]({each.file})\n\n**{each.title}.** {each.caption()}\n" for each in drawn]
+    claims = [f"- {finding.line}" for finding in findings(result)]
+    parts = ["# Optimal stabilization (§4)", f"```\n{text(result)}\n```", *figures, "## Findings", "\n".join(claims)]
+    return "\n\n".join(parts) + "\n"
+
+
 def text(result: Study) -> str:
     """The study for a terminal."""
     models = (result.default, *result.printed)
@@ -158,15 +176,15 @@ def text(result: Study) -> str:
         [
             DEFAULT,
             "Half car behind the bump, by the equations used:\n" + _table(
-                ("(4.1)", "rank B", "growth of A", "J", "max |u1|", "max |u2|", "effort to rest"),
+                ("(4.1)", "rank B", "growth of A", "weakest mode", "J", "max |u1|", "max |u2|", "effort to rest"),
                 [_model_row(s) for s in models],
-            ),
+            ) + "\n" + WEAKEST,
             "By λ, finite horizon:\n" + _table(
-                ("λ", "J", "max |u1|", "max |u2|", "L → L∞ by", "expected"),
+                ("λ", "L14(t_B2)", "J", "max |u1|", "max |u2|", "L → L∞ by", "expected"),
                 [_weight_row(w) for w in result.weighted],
             ),
-            f"u = K x broken at the actuators, and mass and stiffness ± {SPREAD:.0%}:\n" + _table(
-                ("λ", "plant", "growth", "worst", "gain ×", "phase", "σ(I + L)", "disk", "delay", "proved stable"),
+            f"u = K x broken at the actuators; body's mass with its inertias, c1, c2 ± {SPREAD:.0%}:\n" + _table(
+                ROBUST,
                 [row for w in result.weighted for row in _robust_rows(w)],
             ),
             _lost(result.lost),
@@ -176,30 +194,40 @@ def text(result: Study) -> str:
 
 def _lost(lam: float) -> str:
     if not np.isfinite(lam):
-        return "At all these weights the half car's control also holds the car with its wheels stable."
-    return f"On the car with its wheels the half car's control is unstable from λ = {readable(lam, 3)} N²/m²."
+        return "At all these weights the half-car design also holds the car with its wheels stable."
+    return f"On the car with its wheels the half-car design is unstable from λ = {readable(lam, 3)} N²/m²."
 
 
 def _model_row(s: Solution) -> tuple[str, ...]:
     peaks = (f"{readable(u, 3)} N" for u in s.peaks)
     rank = str(np.linalg.matrix_rank(s.model.B))
     cost, effort = (f"{readable(value, 4)} N²s" for value in (s.cost, s.energy_to_rest))
-    return s.model.name, rank, f"{readable(s.growth, 3)} 1/s", cost, *peaks, effort
+    return s.model.name, rank, f"{readable(s.growth, 3)} 1/s", readable(s.weakest, 2), cost, *peaks, effort
 
 
 def _weight_row(w: Weighted) -> tuple[str, ...]:
     peaks = (f"{readable(u, 3)} N" for u in w.solution.peaks)
     rates = (f"{readable(rate, 6)} 1/s" for rate in (w.approach.fitted, w.approach.rate))
-    return f"{w.lam:.0e}", f"{readable(w.solution.cost)} N²s", *peaks, *rates
+    L14 = f"{readable(w.solution.L[0, 0, 3])} N²s²/m"
+    return f"{w.lam:.0e}", L14, f"{readable(w.solution.cost)} N²s", *peaks, *rates
+
+
+def _robustness(w: Weighted) -> list[tuple[str, str, Robustness]]:
+    """Each with the car that the gain is made for and the one that it acts on."""
+    return [
+        ("half-car", "half car", w.half),
+        ("half-car", "car", w.half_on_car),
+        ("full-car", "car", w.full_on_car),
+    ]
 
 
 def _robust_rows(w: Weighted) -> list[tuple[str, ...]]:
-    return [_robust_row(f"{w.lam:.0e}", name, r) for name, r in (("half car", w.half), ("car", w.car))]
+    return [(f"{w.lam:.0e}", design, plant, *_robust_cells(r)) for design, plant, r in _robustness(w)]
 
 
-def _robust_row(weight: str, name: str, r: Robustness) -> tuple[str, ...]:
+def _robust_cells(r: Robustness) -> tuple[str, ...]:
     growths = (f"{readable(value, 3)} 1/s" for value in (r.growth, r.worst))
-    return weight, name, *growths, *_margin_cells(r.margins), _proved(r.certified)
+    return *growths, *_margin_cells(r.margins), _proved(r.certified)
 
 
 def _margin_cells(m: Margins | None) -> tuple[str, ...]:

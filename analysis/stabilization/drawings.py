@@ -8,12 +8,14 @@ from itertools import cycle
 
 import numpy as np
 
+from fmu_src.quantities import PARAMETERS
+
 from ..figures import BLUE, DASHED, ORANGE, PURPLE, RED, TEAL, Axes, Subject, finish
 from .study import Study, Weighted
 
 SHADES = (TEAL, RED, PURPLE)  # of three weights; the default one red, as in the paper
 SHOWN = (1e9, 1e10, 1e11)
-CHOICE = "λ = 10¹⁰ N²/m², H₁ = 1 m, T = 2.3 s, which the paper does not give"
+CHOICE = "λ = {:g} N²/m², H1 = {:g} m, T = {:g} s".format(*(PARAMETERS[name].start for name in ("lambda", "H1", "T")))
 COORDINATES = ((0, "$z$ [mm]"), (1, r"$\varphi$ [mrad]"))
 
 
@@ -37,13 +39,13 @@ def subjects(result: Study) -> list[Subject]:
         )
 
     return [
-        subject("08-L14", "The history of L₁₄", f"As figure 8 of the paper; {CHOICE}. Below, by λ.",
+        subject("08-L14", "The history of L₁₄", f"As figure 8 of the paper; {CHOICE} (our choice). Below, by λ.",
                 [partial(_L14, result), partial(_L14_by_weight, shown)], behind),
         subject("09-motion", "Heave and pitch of the half car",
-                f"As figure 9 of the paper; {CHOICE}. Pitch is positive front up, as in the paper's section 4.",
+                f"As figure 9 of the paper; {CHOICE} (our choice). Pitch is positive front up, as in section 4.",
                 [partial(_motion, result, shown, *which) for which in COORDINATES], partial(_window, 0.0, end)),
         subject("10-forces", "Control forces of the half car",
-                f"As figure 10 of the paper; {CHOICE}. Per axle, positive down on the body.",
+                f"As figure 10 of the paper; {CHOICE} (our choice). Per axle, positive down on the body.",
                 [partial(_forces, shown, axle) for axle in (0, 1)], behind),
         subject("printed", "What the misprints of (4.1) cost",
                 "Optimal stabilization (full) and no control (dashed): (4.1) corrected, with B as printed, whose two "

@@ -1,5 +1,4 @@
-"""The control of the half car on the car with its wheels: the gain by struts, and both plants as functions of their
-parameters."""
+"""Both designs on the car with its wheels: their gains by struts, and both plants as functions of their parameters."""
 
 from __future__ import annotations
 
@@ -10,6 +9,8 @@ from typing import Any
 
 import numpy as np
 
+from fmu_src.controller.design import design
+from fmu_src.controller.fullcar import FullCar
 from fmu_src.controller.halfcar import HalfCar, half_car_state, strut_forces
 from fmu_src.vehicle.linear import linearized
 from fmu_src.vehicle.parameters import Car
@@ -19,8 +20,8 @@ from ..methods.polynomials import Array
 from .certified import Plant
 
 VARIED = ("m", "c1", "c2")
-"""What is varied: the body's mass, its moments of inertia in proportion, and the struts' stiffness. A and B are affine
-in 1/m, in c1 and in c2."""
+"""What is varied: the body's mass, its moments of inertia in proportion, and the struts' stiffness, front and rear each
+for itself. A and B are affine in 1/m, in c1 and in c2."""
 INERTIAS = ("Jx", "Jy", "Jz")
 
 
@@ -30,6 +31,11 @@ def strut_gain(K: Array) -> Array:
     forces = np.array([strut_forces(u) for u in ((1.0, 0.0), (0.0, 1.0))]).T
     gain: Array = forces @ K @ seen
     return gain
+
+
+def full_gain(car: FullCar) -> Array:
+    """Gain (4, 14) of the full-car design's u = K x, infinite horizon."""
+    return np.array(design(car, infinite=True, span=None).infinite, dtype=float).reshape(4, 14)
 
 
 def half_car_plant(car: HalfCar) -> Plant:

@@ -10,6 +10,7 @@ from scipy.interpolate import BSpline, make_interp_spline
 from scipy.linalg import expm
 
 from fmu_src.controller.riccati import finite_horizon, infinite_horizon
+from fmu_src.quantities import ParameterError
 
 from ..errors import InputError
 from ..methods.polynomials import Array
@@ -123,7 +124,7 @@ def stationary(regulator: Regulator) -> tuple[Array, Array]:
     """
     try:
         return infinite_horizon(regulator.A, regulator.B, regulator.Q, regulator.R)
-    except np.linalg.LinAlgError as error:
+    except (np.linalg.LinAlgError, ParameterError) as error:
         raise InputError(f"no control u = K x is optimal for ever: {error}") from error
 
 
@@ -151,15 +152,24 @@ def quadrature(regulator: Regulator, t: Array, x: Array, u: Array) -> float:
     return float(simpson(regulator.running_cost(x, u), x=t))
 
 
+def modal_reach(A: Array, B: Array) -> float:
+    """Least |wᴴB| / |w| |B| over the left eigenvectors w of A: how far the control reaches the mode it reaches least.
+
+    0 if a mode is out of reach, and with eigenvalues all different only then (Popov, Belevitch, Hautus): (A, B) is
+    not controllable. A measure of the coordinates as they are; here SI units.
+    """
+    _, w = np.linalg.eig(A.T)
+    return float(np.linalg.norm(w.T @ B, axis=1).min() / np.linalg.norm(B, 2))
+
+
 def energy_to_rest(A: Array, B: Array, x0: Array, span: float) -> float:
     """Least ∫ uᵀu dt that brings x' = A x + B u from x0 to rest in the time `span` [s]: what control must spend.
 
-    (e^{AT} x0)ᵀ W⁻¹ (e^{AT} x0) with the controllability Gramian W; infinite where W is singular.
+    (e^{AT} x0)ᵀ W⁻¹ (e^{AT} x0) with the controllability Gramian W; infinite where W is singular to round-off.
     """
     n = len(A)
     flow = expm(np.block([[-A, B @ B.T], [np.zeros((n, n)), A.T]]) * span)
     gramian, end = flow[n:, n:].T @ flow[:n, n:], flow[n:, n:].T @ x0  # C. F. Van Loan, IEEE TAC 23 (1978) 395
-    try:
-        return float(end @ np.linalg.solve(gramian, end))
-    except np.linalg.LinAlgError:
+    if np.linalg.matrix_rank(gramian) < n:
         return float("inf")
+    return float(end @ np.linalg.solve(gramian, end))

@@ -1,4 +1,5 @@
-"""§4 computed for the default half car and bump: at the chosen weights, as functions of λ, and as printed."""
+"""§4 computed for the default half car and bump: at the chosen weights, as functions of λ, and as printed; how robust
+the half-car and the full-car design are."""
 
 from __future__ import annotations
 
@@ -9,6 +10,7 @@ import numpy as np
 from scipy.optimize import brentq
 from tqdm import tqdm
 
+from fmu_src.controller.fullcar import FullCar
 from fmu_src.controller.halfcar import HalfCar
 from fmu_src.quantities import PARAMETERS
 from fmu_src.road.profiles import RoadParameters
@@ -16,12 +18,22 @@ from fmu_src.vehicle.parameters import Car
 
 from ..methods.polynomials import Array
 from .certified import Certified, Plant, around, certify, growth
-from .full_car import car_plant, half_car_plant, strut_gain, varied_values
+from .full_car import car_plant, full_gain, half_car_plant, strut_gain, varied_values
 from .half_car import Model, come_down, corrected, over_the_bump, printed, printed_control
 from .limit import Approach, approach
 from .margins import Margins, margins
 from .pontryagin import by_collocation, by_exponentials, hamiltonian
-from .regulator import Arc, Regulator, by_riccati, energy_to_rest, instants, quadrature, riccati_solution, stationary
+from .regulator import (
+    Arc,
+    Regulator,
+    by_riccati,
+    energy_to_rest,
+    instants,
+    modal_reach,
+    quadrature,
+    riccati_solution,
+    stationary,
+)
 
 STEP = 1e-3  # s, between two samples of an arc
 SPREAD = 0.3  # of mass and stiffness
@@ -46,6 +58,11 @@ class Solution:
         """Largest |u1|, |u2| [N]."""
         peaks: Array = np.abs(self.arc.u).max(axis=1)
         return peaks
+
+    @property
+    def weakest(self) -> float:
+        """How far the control reaches the mode that it reaches least, see `modal_reach`."""
+        return modal_reach(self.model.A, self.model.B)
 
     @property
     def growth(self) -> float:
@@ -76,13 +93,15 @@ class Robustness:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Weighted:
-    """What a weight λ gives: the optimal arc, the way to the infinite horizon, robustness on half and whole car."""
+    """What a weight λ gives: the optimal arc, the way to the infinite horizon, and how robust u = K x is of the
+    half-car design on the half car and on the car with its wheels, and of the full-car design on the latter."""
 
     lam: float
     solution: Solution
     approach: Approach
     half: Robustness
-    car: Robustness
+    half_on_car: Robustness
+    full_on_car: Robustness
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -163,7 +182,8 @@ def weigh(car: HalfCar, road: RoadParameters) -> Weighted:
         solution=solution,
         approach=approach(solution.regulator),
         half=robustness(half_car_plant(car), K, varied_values(car)),
-        car=robustness(car_plant(whole), strut_gain(K), varied_values(whole)),
+        half_on_car=robustness(car_plant(whole), strut_gain(K), varied_values(whole)),
+        full_on_car=robustness(car_plant(whole), full_gain(FullCar(car=whole, lam=car.lam)), varied_values(whole)),
     )
 
 
@@ -182,7 +202,8 @@ def robustness(plant: Plant, K: Array, values: dict[str, float]) -> Robustness:
 
 
 def lost_at(car: HalfCar) -> float:
-    """The least λ in `WEIGHTS`' range from which the half car's control makes the car with its wheels unstable."""
+    """The least λ in `WEIGHTS`' range from which the half car's control makes the car with its wheels unstable;
+    infinite if none does."""
     plant, whole = car_plant(Car()), varied_values(Car())
 
     def worst(log_lam: float) -> float:
@@ -190,5 +211,7 @@ def lost_at(car: HalfCar) -> float:
         return growth(plant, strut_gain(K), whole)
 
     decades = np.log10(WEIGHTS)
-    over = next((k for k, x in enumerate(decades) if worst(x) > 0.0), 0)
-    return float(10.0 ** brentq(worst, decades[over - 1], decades[over], xtol=1e-6)) if over else float("inf")
+    over = next((k for k, x in enumerate(decades) if worst(x) > 0.0), None)
+    if over is None:
+        return float("inf")
+    return float(10.0 ** (brentq(worst, decades[over - 1], decades[over], xtol=1e-6) if over else decades[0]))

@@ -2,10 +2,13 @@
 
 Sensors at each strut: an accelerometer at its top (vertical, body accelerations to first order in the angles) and its
 travel. Both are functions of the car's states and of the actuators' forces alone, as the struts stand between body and
-road: the controller works them out of its inputs, with the equations of the car, and needs no further wires.
+road: the controller works them out of its inputs, with the equations of the car, and needs no further wires. So they
+are those of a car with the controller's own parameters, which are to be those of the car.
 
-The filter knows the car linearized at rest, x' = A x + Bu u + Bh h, its forces held between samples, and takes the road
-heights h for white noise: anew for each sample. Computing it takes numpy and scipy; running it the standard library.
+The filter knows the car linearized at rest, x' = A x + Bu u + Bh h, and takes the road heights h for white noise: anew
+for each sample. Between samples it takes the forces for those that act at the later one: right where they are held, and
+with a lag or a valve, which moves them in between, an error of the model that the sensors correct. Computing it takes
+numpy and scipy; running it the standard library.
 """
 
 from __future__ import annotations

@@ -76,6 +76,15 @@ class ControlParameters:
         """Time [s] from which it acts no more: T, or never."""
         return self.T if self.horizon == "finite" else inf
 
+    def fault_of_step(self, t: float, step: float) -> str | None:
+        """Why a step [s] from t [s] cannot be made, if it is longer than the whole of the control that it meets."""
+        span = self.end - self.begin
+        meets = t < self.end - SNAP and t + step > self.begin + SNAP
+        if not (self.enabled and meets and step > span + SNAP):
+            return None
+        wanted = f"wanted at least a step of {step:g} s of control"
+        return f"T = {self.T!r} s: {wanted}, got {span:g} s from {self.begin:g} s on"
+
 
 REALS = ("T", "t_on", "v0", "Lambda", "tau0", "t_start")
 HALF_CAR, CAR, WEIGHTS, HARDWARE = (  # names of the parameters, as the FMUs have them

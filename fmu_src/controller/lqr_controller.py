@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any, ClassVar
 
 from ..quantities import FORCES, STATES, ParameterError
-from ..slave import Slave
+from ..slave import Slave, StepError
 from .design import FILE_NAMES, Design, design, stored
 from .hardware import Loop, Memory
 from .law import CAR, CHOICES, HALF_CAR, HARDWARE, REALS, WEIGHTS, ControlParameters, control_law, control_parameters
@@ -26,6 +26,7 @@ class LqrController(Slave):
     switches: ClassVar[dict[str, str]] = {"enabled": "whether the controller acts; all forces are 0 if not"}
     dependencies: ClassVar[dict[str, tuple[str, ...]]] = {q.name: tuple(x.name for x in STATES) for q in FORCES}
 
+    _control = ControlParameters()
     _design: Design | None = None
     _loop: Loop | None = None  # None: ideal actuators and full knowledge of the states
     _before, _after = Memory(), Memory()  # the present look at the inputs
@@ -35,7 +36,7 @@ class LqrController(Slave):
         wanted = control_parameters({**self.parameters(), **choices, "enabled": self.on[0]})
         if wanted.enabled:
             self._design = self._designed(wanted)
-        self._law = control_law(wanted, self._design)
+        self._control, self._law = wanted, control_law(wanted, self._design)
         self._loop = None
         if wanted.enabled and not wanted.hardware.ideal:
             try:
@@ -70,6 +71,8 @@ class LqrController(Slave):
         self._before, self._after = _memory(before), _memory(after)
 
     def advance(self, t: float, step: float) -> None:
+        if fault := self._control.fault_of_step(t, step):
+            raise StepError(fault)
         self.time = t + step
         if self._loop:
             self._before = self._loop.elapsed(step, self._after)

@@ -57,12 +57,30 @@ def finite_horizon(A: Array, B: Array, Q: Array, R: Array, to_go: Array) -> Arra
 def infinite_horizon(A: Array, B: Array, Q: Array, R: Array) -> tuple[Array, Array]:
     """(L, K) of remark 4.1: the stabilizing solution of the algebraic equation, and the gain of u = K x.
 
-    `control.lqr` returns the gain of u = −K x; the paper's K = −R⁻¹ Bᵀ L has the other sign.
+    `control.lqr` returns the gain of u = −K x; the paper's K = −R⁻¹ Bᵀ L has the other sign. Raises LinAlgError or
+    ParameterError where there is no stabilizing solution, or none in double precision.
     """
     import control
 
-    gain, L, _ = control.lqr(A, B, Q, R)
+    gain, L = control.lqr(A, B, Q, R)[:2] if Q.any() else (0.0 * B.T, 0.0 * A)
+    _verify(L, A, B, Q, R)
     return L, -gain
+
+
+def _verify(L: Array, A: Array, B: Array, Q: Array, R: Array) -> Array:
+    """Poles (n) of the closed loop with the algebraic equation's solution L.
+
+    Raises ParameterError unless L solves it to round-off and all poles are surely on the left.
+    """
+    import numpy as np
+
+    S = B @ np.linalg.solve(R, B.T)
+    poles = np.linalg.eigvals(A - S @ L)
+    stable = poles.real.max() < -ROUND_OFF * np.abs(poles).max()
+    size = np.abs(L @ A).max() + np.abs(L @ S @ L).max() + np.abs(Q).max()
+    if not (np.abs(riccati_rate(L, A, B, Q, R)).max() <= RESIDUAL * size and stable):
+        raise ParameterError(["the Riccati equation has no stabilizing solution in double precision"])
+    return poles
 
 
 def without_cross(A: Array, B: Array, Q: Array, R: Array, N: Array) -> tuple[Array, Array, Array]:
@@ -93,12 +111,7 @@ def flow(A: Array, B: Array, Q: Array, R: Array) -> tuple[Callable[[Array, Array
         last = solve_continuous_are(A, B, Q, R) if Q.any() else np.zeros_like(A)
     except (np.linalg.LinAlgError, ValueError) as error:
         raise ParameterError([f"the Riccati equation has no stabilizing solution: {error}"]) from error
-    closed = A - S @ last
-    poles = np.linalg.eigvals(closed)
-    stable = poles.real.max() < -ROUND_OFF * np.abs(poles).max()
-    size = np.abs(last @ A).max() + np.abs(last @ S @ last).max() + np.abs(Q).max()
-    if not (np.abs(riccati_rate(last, A, B, Q, R)).max() <= RESIDUAL * size and stable):
-        raise ParameterError(["the Riccati equation has no stabilizing solution in double precision"])
+    poles, closed = _verify(last, A, B, Q, R), A - S @ last
     reach = solve_continuous_lyapunov(closed, -S)
 
     def later(L: Array, s: Array) -> Array:
