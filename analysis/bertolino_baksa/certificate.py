@@ -11,7 +11,7 @@ import json
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from flint import fmpq
@@ -39,6 +39,7 @@ THEOREM = (
 )
 Build = Callable[[dict[str, Any]], ExactSystem]
 Norms = Callable[[Array], tuple[Norm, ...]]
+Read = TypeVar("Read")
 
 
 @dataclass(frozen=True, slots=True)
@@ -160,37 +161,52 @@ def verify(certificate: Certificate, build: Build) -> Proof:
         system = build(certificate.model)
         proof = prove(system, proved_metric(system, certificate.S), certificate.pieces, certificate.x0.tolist())
         for claim in certificate.claims:
-            epsilon = proof.epsilon(claim.norm, claim.table[:, 1])
-            for (claimed, delta), proved in zip(claim.table.tolist(), epsilon.tolist(), strict=True):
-                if not proved <= claimed:
-                    raise NotProvedError(
-                        f"{claim.norm.name} norm, delta = {delta!r}: claimed eps = {claimed!r}, proved {proved!r}"
-                    )
+            refuse_unproved(claim, proof.epsilon(claim.norm, claim.table[:, 1]).tolist())
     return proof
+
+
+def refuse_unproved(claim: Claim, epsilon: Sequence[float]) -> None:
+    """Raise NotProvedError with the first row of the claim's table whose ε is below what is proved of its δ."""
+    for (claimed, delta), proved in zip(claim.table.tolist(), epsilon, strict=True):
+        if not proved <= claimed:
+            raise NotProvedError(
+                f"{claim.norm.name} norm, delta = {delta!r}: claimed eps = {claimed!r}, proved {proved!r}"
+            )
 
 
 def to_json(certificate: Certificate) -> bytes:
     """The certificate as a file's bytes, with the hash of its content."""
-    content = {
-        "format": FORMAT,
-        "theorem": THEOREM,
-        "model": certificate.model,
-        "x0": certificate.x0.tolist(),
-        "metric": certificate.S.tolist(),
-        "claims": [
-            {
-                "norm": {"name": c.norm.name, "largest": c.norm.largest, "T": c.norm.T.tolist()},
-                "l": c.floor,
-                "delta of eps": [{"eps": e, "delta": d} for e, d in c.table.tolist()],
-            }
-            for c in certificate.claims
-        ],
-        "pieces": [
-            {"begin": str(p.begin), "end": str(p.end), "x_lin": p.linear.tolist(), "e": p.error.tolist()}
-            for p in certificate.pieces
-        ],
-    }
+    return sealed(
+        {
+            "format": FORMAT,
+            "theorem": THEOREM,
+            "model": certificate.model,
+            "x0": certificate.x0.tolist(),
+            "metric": certificate.S.tolist(),
+            "claims": claims_json(certificate.claims),
+            "pieces": [
+                {"begin": str(p.begin), "end": str(p.end), "x_lin": p.linear.tolist(), "e": p.error.tolist()}
+                for p in certificate.pieces
+            ],
+        }
+    )
+
+
+def sealed(content: dict[str, Any]) -> bytes:
+    """A file's bytes: the content after its hash."""
     return json.dumps({"sha256": _hash(content), **content}, indent=1, allow_nan=False).encode() + b"\n"
+
+
+def claims_json(claims: Sequence[Claim]) -> list[dict[str, Any]]:
+    """Claims as plain data."""
+    return [
+        {
+            "norm": {"name": c.norm.name, "largest": c.norm.largest, "T": c.norm.T.tolist()},
+            "l": c.floor,
+            "delta of eps": [{"eps": e, "delta": d} for e, d in c.table.tolist()],
+        }
+        for c in claims
+    ]
 
 
 def _hash(content: dict[str, Any]) -> str:
@@ -199,6 +215,11 @@ def _hash(content: dict[str, Any]) -> str:
 
 def from_json(data: bytes, where: str) -> Certificate:
     """Read a certificate. Raises InputError if it is not one, or if it was altered."""
+    return opened(data, where, certificate_of)
+
+
+def opened(data: bytes, where: str, read: Callable[[dict[str, Any]], Read]) -> Read:
+    """What `read` makes of a file's content. Raises InputError if it cannot be read, or if it was altered."""
     if len(data) > MAX_BYTES:
         raise InputError(f"{where}: wanted at most {MAX_BYTES} bytes, got {len(data)}")
     try:
@@ -208,39 +229,49 @@ def from_json(data: bytes, where: str) -> Certificate:
             raise InputError(f"{where}: wanted a certificate of format {FORMAT}, got {content['format']!r}")
         if stated != _hash(content):
             raise InputError(f"{where}: the content does not have the hash that it states: it was altered")
-        return _certificate(content)
+        return read(content)
     except (KeyError, TypeError, ValueError, AttributeError, RecursionError, ZeroDivisionError, OverflowError) as error:
         raise InputError(f"{where}: cannot be read as a certificate: {type(error).__name__}: {error}") from error
 
 
-def _certificate(content: dict[str, Any]) -> Certificate:
-    x0 = _numbers(content["x0"], 1)
+def certificate_of(content: dict[str, Any]) -> Certificate:
+    """The certificate from its plain data; raises what reading wrong data raises."""
+    x0 = numbers(content["x0"], 1)
     n = len(x0)
     pieces = []
     for p in content["pieces"]:
-        linear, error = _numbers(p["x_lin"], 2), _numbers(p["e"], 2)
+        linear, error = numbers(p["x_lin"], 2), numbers(p["e"], 2)
         if not (linear.shape == error.shape and len(linear) == n and 2 <= linear.shape[1] <= 100):
             raise ValueError(f"a piece has coefficients of the shapes {linear.shape} and {error.shape}")
         begin, end = (fmpq(*map(int, str(p[key]).split("/"))) for key in ("begin", "end"))
         if not end > begin:
             raise ValueError(f"a piece runs from {begin} to {end}")
         pieces.append(Piece(begin, end, linear, error))
+    S, model, claims = system_of(content, n)
+    if not pieces:
+        raise ValueError("wanted pieces")
+    return Certificate(model, x0, S, tuple(pieces), claims)
+
+
+def system_of(content: dict[str, Any], n: int) -> tuple[Array, dict[str, Any], tuple[Claim, ...]]:
+    """Metric, model and claims of n states from plain data; raises ValueError where they cannot be."""
     claims = []
     for c in content["claims"]:
-        table = _numbers([[row["eps"], row["delta"]] for row in c["delta of eps"]], 2)
+        table = numbers([[row["eps"], row["delta"]] for row in c["delta of eps"]], 2)
         if not (np.all(np.diff(table, axis=0) >= 0.0) and table[0, 1] > 0.0 and table[0, 0] == c["l"]):
             raise ValueError("delta(eps) must rise, from l and a delta > 0 on")
-        T = _numbers(c["norm"]["T"], 2)
+        T = numbers(c["norm"]["T"], 2)
         if T.shape != (n, n):
             raise ValueError(f"a norm has the shape {T.shape}")
         claims.append(Claim(Norm(str(c["norm"]["name"]), T, c["norm"]["largest"] is True), table))
-    S = _numbers(content["metric"], 2)
-    if S.shape != (n, n) or not pieces or not claims or not isinstance(content["model"], dict):
-        raise ValueError("wanted a metric of the states, pieces, claims and a model")
-    return Certificate(content["model"], x0, S, tuple(pieces), tuple(claims))
+    S = numbers(content["metric"], 2)
+    if S.shape != (n, n) or not claims or not isinstance(content["model"], dict):
+        raise ValueError("wanted a metric of the states, claims and a model")
+    return S, content["model"], tuple(claims)
 
 
-def _numbers(values: Any, dimensions: int) -> Array:
+def numbers(values: Any, dimensions: int) -> Array:
+    """An array of finite numbers; raises ValueError for anything else."""
     array = np.array(values, dtype=float)
     if array.ndim != dimensions or not all(map(math.isfinite, array.ravel().tolist())):
         raise ValueError(f"wanted {dimensions}-dimensional finite numbers, got {str(values)[:60]}")
