@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from . import strict
 from .balls import Array, NotProvedError, precision
 from .bounded_inputs import Bounds, Driven, gains
 from .certificate import (
@@ -17,7 +18,6 @@ from .certificate import (
     Build,
     Claim,
     claims_json,
-    numbers,
     refuse_unproved,
     sealed,
     system_of,
@@ -110,8 +110,10 @@ def to_json(certificate: BoundedCertificate) -> bytes:
 
 def certificate_of(content: dict[str, Any]) -> BoundedCertificate:
     """The certificate from its plain data; raises what reading wrong data raises."""
-    sizes = numbers(content["bounds"], 1)
-    if not np.all(sizes >= 0.0) or (content["tied"] is True and len(sizes) % 2):
+    strict.of_keys(content, ("format", "kind", "theorem", "model", "bounds", "tied", "metric", "claims"))
+    strict.theorem(content["theorem"], THEOREM)
+    sizes, tied = strict.numbers(content["bounds"], 1), strict.truth(content["tied"])
+    if not np.all(sizes >= 0.0) or (tied and len(sizes) % 2):
         raise ValueError(f"bounds of inputs: wanted numbers >= 0, got {sizes.tolist()}")
     S, model, claims = system_of(content, len(content["metric"]))
-    return BoundedCertificate(model, Bounds(sizes, content["tied"] is True), S, claims)
+    return BoundedCertificate(model, Bounds(sizes, tied), S, claims)

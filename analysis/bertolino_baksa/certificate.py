@@ -1,14 +1,14 @@
 """Certificates: the statement of definition 2.1 in words and numbers, with all that is needed to prove it anew.
 
-A certificate is made by `certify` and judged by `verify`, which shares no step with how the pieces and the table were
-found: it proves the claims from the certificate's own numbers, by defect and logarithmic norm.
+`certify` finds pieces and a table of δ(ε); `verify` proves a certificate's claims from its own numbers, by defect and
+logarithmic norm, however they were found. The proof itself (`proof.prove`, `Proof.epsilon`) and the exact
+equations serve both: a fault in them would be made twice. What is independent of them is `adversary`.
 """
 
 from __future__ import annotations
 
 import hashlib
 import json
-import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, TypeVar
@@ -17,6 +17,7 @@ import numpy as np
 from flint import fmpq
 
 from ..errors import InputError
+from . import strict
 from .balls import Array, ExactSystem, NotProvedError, precision
 from .norms import Norm, proved_metric
 from .proof import Proof, prove
@@ -223,9 +224,9 @@ def opened(data: bytes, where: str, read: Callable[[dict[str, Any]], Read]) -> R
     if len(data) > MAX_BYTES:
         raise InputError(f"{where}: wanted at most {MAX_BYTES} bytes, got {len(data)}")
     try:
-        content = json.loads(data)
+        content = strict.loads(data)
         stated = content.pop("sha256")
-        if content["format"] != FORMAT:
+        if type(content["format"]) is not int or content["format"] != FORMAT:
             raise InputError(f"{where}: wanted a certificate of format {FORMAT}, got {content['format']!r}")
         if stated != _hash(content):
             raise InputError(f"{where}: the content does not have the hash that it states: it was altered")
@@ -236,14 +237,17 @@ def opened(data: bytes, where: str, read: Callable[[dict[str, Any]], Read]) -> R
 
 def certificate_of(content: dict[str, Any]) -> Certificate:
     """The certificate from its plain data; raises what reading wrong data raises."""
-    x0 = numbers(content["x0"], 1)
+    strict.of_keys(content, ("format", "theorem", "model", "x0", "metric", "claims", "pieces"))
+    strict.theorem(content["theorem"], THEOREM)
+    x0 = strict.numbers(content["x0"], 1)
     n = len(x0)
     pieces = []
     for p in content["pieces"]:
-        linear, error = numbers(p["x_lin"], 2), numbers(p["e"], 2)
+        strict.of_keys(p, ("begin", "end", "x_lin", "e"))
+        linear, error = strict.numbers(p["x_lin"], 2), strict.numbers(p["e"], 2)
         if not (linear.shape == error.shape and len(linear) == n and 2 <= linear.shape[1] <= 100):
             raise ValueError(f"a piece has coefficients of the shapes {linear.shape} and {error.shape}")
-        begin, end = (fmpq(*map(int, str(p[key]).split("/"))) for key in ("begin", "end"))
+        begin, end = strict.fraction(p["begin"]), strict.fraction(p["end"])
         if not end > begin:
             raise ValueError(f"a piece runs from {begin} to {end}")
         pieces.append(Piece(begin, end, linear, error))
@@ -257,22 +261,16 @@ def system_of(content: dict[str, Any], n: int) -> tuple[Array, dict[str, Any], t
     """Metric, model and claims of n states from plain data; raises ValueError where they cannot be."""
     claims = []
     for c in content["claims"]:
-        table = numbers([[row["eps"], row["delta"]] for row in c["delta of eps"]], 2)
-        if not (np.all(np.diff(table, axis=0) >= 0.0) and table[0, 1] > 0.0 and table[0, 0] == c["l"]):
+        norm = strict.of_keys(strict.of_keys(c, ("norm", "l", "delta of eps"))["norm"], ("name", "largest", "T"))
+        rows = [strict.of_keys(row, ("eps", "delta")) for row in c["delta of eps"]]
+        table, floor = strict.numbers([[row["eps"], row["delta"]] for row in rows], 2), strict.numbers(c["l"], 0)
+        if not (np.all(np.diff(table, axis=0) >= 0.0) and table[0, 1] > 0.0 and table[0, 0] == floor):
             raise ValueError("delta(eps) must rise, from l and a delta > 0 on")
-        T = numbers(c["norm"]["T"], 2)
+        T = strict.numbers(norm["T"], 2)
         if T.shape != (n, n):
             raise ValueError(f"a norm has the shape {T.shape}")
-        claims.append(Claim(Norm(str(c["norm"]["name"]), T, c["norm"]["largest"] is True), table))
-    S = numbers(content["metric"], 2)
+        claims.append(Claim(Norm(strict.text(norm["name"]), T, strict.truth(norm["largest"])), table))
+    S = strict.numbers(content["metric"], 2)
     if S.shape != (n, n) or not claims or not isinstance(content["model"], dict):
         raise ValueError("wanted a metric of the states, claims and a model")
     return S, content["model"], tuple(claims)
-
-
-def numbers(values: Any, dimensions: int) -> Array:
-    """An array of finite numbers; raises ValueError for anything else."""
-    array = np.array(values, dtype=float)
-    if array.ndim != dimensions or not all(map(math.isfinite, array.ravel().tolist())):
-        raise ValueError(f"wanted {dimensions}-dimensional finite numbers, got {str(values)[:60]}")
-    return array
