@@ -87,6 +87,7 @@ def _parser() -> argparse.ArgumentParser:
     kind.add_argument("--largest", action="store_true", help="also search the largest amplitude that can be certified")
     kind.add_argument("--closed-loop", action="store_true", help="under control for ever, and against no control")
     kind.add_argument("--bounded", type=float, metavar="A", help="every road with |h| <= A [m] instead, around rest")
+    verb.add_argument("--slope", type=float, metavar="V", help="with --bounded: roads with |dh/dt| <= V [m/s] too")
     verb.set_defaults(do=_certify)
 
     verb = verbs.add_parser("verify", help="prove a certificate's claims anew")
@@ -282,12 +283,14 @@ def _certify(options: argparse.Namespace) -> int:
     if options.out and options.out.suffix == ".svg":
         raise InputError(f"-o {options.out}: wanted a name for the certificate, CERT.json; its figure is CERT.svg")
     scenario = read_scenario(options.scenario)
-    if options.out and (options.quick or options.bounded is not None):
-        raise InputError(f"-o {options.out}: --quick and --bounded write no certificate; leave it out")
+    if options.out and options.quick:
+        raise InputError(f"-o {options.out}: --quick writes no certificate; leave it out")
+    if options.slope is not None and options.bounded is None:
+        raise InputError(f"--slope {options.slope!r}: wanted --bounded with it")
     if options.bounded is not None:
         from .certificates.car_bounded_roads import command
 
-        return command(scenario.parameters, options.bounded)
+        return command(scenario.parameters, options.bounded, options.slope, options.out)
     if options.closed_loop:
         from .certificates.closed_loop_certificate import command as compare
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from typing import Any
 
 import numpy as np
 import pytest
@@ -13,6 +14,7 @@ from analysis.bertolino_baksa.certificate import from_json, to_json, verify
 from analysis.car import car_form, road_signal
 from analysis.certificates.car_certificates import build
 from analysis.certificates.closed_loop_certificate import both, comparison, infinite_gain
+from analysis.errors import InputError
 from analysis.reference import road_parameters
 from analysis.scenario import read_scenario
 from fmu_src.controller.design import design
@@ -47,3 +49,11 @@ def test_control_is_certified_in_the_passive_norms() -> None:
     energy = closed.claims[0]
     assert energy.largest_delta > 1.08 * passive.claims[0].largest_delta  # both to CLOSE
     assert len(comparison(passive, closed)) == 3
+
+
+@pytest.mark.parametrize(
+    "option", [{"force_limit": 500.0}, {"actuator_lag": 0.02}, {"sample_time": 0.01}, {"actuators": "semi-active"}]
+)
+def test_a_loop_with_hardware_is_refused_by_name(option: dict[str, Any]) -> None:
+    with pytest.raises(InputError, match=f"no hardware, got {next(iter(option))} = "):
+        infinite_gain(option)

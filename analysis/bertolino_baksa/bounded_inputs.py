@@ -3,25 +3,27 @@
     x(t) = e^(At) x(0) + ∫ e^(A(t − s)) (B w + R(x, w)) ds,  so  Y ≥ κδ + G W + Γ R̄(Y, W)  keeps |x_j(t)| ≤ Y_j
 
 for all t ≥ 0, with G = ∫|e^(At) B| dt and Γ = ∫|e^(At)| dt: as long as x is within Y, it is even within the right side.
+Where heights and slopes are bounded together, less than G W is needed (`slopes.py`).
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
-from flint import fmpq
+from flint import arb_mat, fmpq
 from scipy.linalg import expm
+from scipy.optimize import linprog
+from scipy.sparse import diags, vstack
 
-from ..methods.signals import Piece as Constant
-from ..methods.signals import Signal
 from ..methods.standard_form import StandardForm
-from .adversary import motions
 from .balls import Array, ExactSystem, NotProvedError, matrix, rounded
 from .cells import CELLS, Decay, decay
 from .majorant import Majorant, majorant
 from .norms import Metric, Norm
+from .slopes import largest_outputs
 from .tube import Piece, input_matrix
 
 TURN = 0.06  # rad that the fastest mode turns over a cell
@@ -31,33 +33,70 @@ ROOM_INPUT = 2.0
 ROUNDS = 200  # of the iteration for Y
 STRICT = 1e-9  # relative: by which Y exceeds what it must
 MEMORY = 4.0  # slowest time constants that the worst input is made for
-SAMPLES = 2000  # over them
-TURNS = 12  # of the search for the worst input in a norm
+SAMPLES = 1200  # over them
+TURNS, TURNS_TIED = 12, 3  # of the search for the worst input in a norm
+STARTS = 2  # of it where the inputs are tied
+
+
+@dataclass(frozen=True, slots=True)
+class Bounds:
+    """|w_i(t)| ≤ sizes_i (m,) for all t ≥ 0; `tied`: the second half are the rates of the first, 0 at t = 0."""
+
+    sizes: Array
+    tied: bool = False
 
 
 @dataclass(frozen=True, slots=True)
 class Gains:
-    """What the linear part makes of bounded inputs: G (n, m) and Γ (n, n), and e^(At) over cells for others."""
+    """What bounds the linear part under inputs of any kind: e^(At) over cells, and Γ (n, n)."""
 
     system: ExactSystem
     metric: Metric
     decay: Decay
-    of_inputs: Array
     of_rates: Array
 
-    def motion(self, W: Array, start: Array) -> tuple[Array, Array]:
+    def driven(self, left: Array, bounds: Bounds) -> Array:
+        """Bounds (p,) of |left x_lin| from rest, left (p, n), over all inputs within the bounds."""
+        B = input_matrix(self.system)
+        if not bounds.tied:
+            return np.asarray(self.decay.integral(self.metric, left, B) @ bounds.sizes * (1.0 + STRICT))
+        half = self.system.m // 2
+        heights, slopes = (arb_mat([row[k : k + half] for row in B.tolist()]) for k in (0, half))
+        A, V = bounds.sizes[:half], bounds.sizes[half:]
+        tied = largest_outputs(self.decay, self.metric, left, heights, slopes, A, V)
+        apart = self.decay.integral(self.metric, left, heights) * A + self.decay.integral(self.metric, left, slopes) * V
+        return np.asarray(np.minimum(tied, apart).sum(axis=1) * (1.0 + STRICT))
+
+    def under(self, bounds: Bounds) -> Driven:
+        """What these bounds make of the states."""
+        return Driven(self, bounds, self.driven(np.eye(self.system.n), bounds))
+
+    def spread(self, norm: Norm) -> Array:
+        """κ_j (n,) ≥ sup_t |(e^(At) y)_j|/N(y)."""
+        return np.asarray(self.decay.rows(norm).max(axis=0))
+
+
+@dataclass(frozen=True, slots=True)
+class Driven:
+    """All inputs within the bounds; `states` (n,) bounds |x_j| of the linear part from rest."""
+
+    gains: Gains
+    bounds: Bounds
+    states: Array
+
+    def motion(self, start: Array) -> tuple[Array, Array]:
         """Y (n,) ≥ |x_j(t)| for all t ≥ 0 where |(e^(At) x(0))_j| ≤ start_j (n,), and bounds (n,) of |R(x, w)|.
 
         Raises NotProvedError if the iteration from below finds no Y.
         """
-        linear = start + self.of_inputs @ W
+        W, linear = self.bounds.sizes, start + self.states
         linear = (linear + STRICT * linear.max()) * (1.0 + STRICT)
         for room in ROOMS:
-            bound = majorant(self.system, np.concatenate([room * linear, ROOM_INPUT * W]) + 1e-12)
+            bound = majorant(self.gains.system, np.concatenate([room * linear, ROOM_INPUT * W]) + 1e-12)
             Y = linear
             for _ in range(ROUNDS):
                 forced = _forced(bound, Y, W)
-                needed = (linear + self.of_rates @ forced) * (1.0 + STRICT)
+                needed = (linear + self.gains.of_rates @ forced) * (1.0 + STRICT)
                 if not np.all(np.isfinite(needed)):
                     break
                 if np.all(needed <= Y):
@@ -65,21 +104,18 @@ class Gains:
                 Y = needed * (1.0 + 1e3 * STRICT)
         raise NotProvedError("the bounds of the states grow without end: this input or start is too large")
 
-    def spread(self, norm: Norm) -> Array:
-        """κ_j (n,) ≥ sup_t |(e^(At) y)_j|/N(y)."""
-        return np.asarray(self.decay.rows(norm).max(axis=0))
-
-    def epsilon(self, W: Array, norm: Norm, delta: Sequence[float]) -> list[float]:
-        """ε for each δ: N(x(0)) ≤ δ and |w| ≤ W imply N(x(t)) ≤ ε for all t ≥ 0.
+    def epsilon(self, norm: Norm, delta: Sequence[float]) -> list[float]:
+        """ε for each δ: N(x(0)) ≤ δ and inputs within the bounds imply N(x(t)) ≤ ε for all t ≥ 0.
 
         Raises NotProvedError if there is none for one of them.
         """
-        one, spread, kappa = np.eye(self.system.n), self.spread(norm), float(self.decay.of(norm).max())
-        driven = self.decay.integral(self.metric, norm.T, input_matrix(self.system)) @ W
-        by_rates = self.decay.integral(self.metric, norm.T, matrix(one))
+        gains = self.gains
+        spread, kappa = gains.spread(norm), float(gains.decay.of(norm).max())
+        driven = gains.driven(norm.T, self.bounds)
+        by_rates = gains.decay.integral(gains.metric, norm.T, matrix(np.eye(gains.system.n)))
         found = []
         for d in delta:
-            rows = driven + by_rates @ self.motion(W, spread * d)[1]
+            rows = driven + by_rates @ self.motion(spread * d)[1]
             size = rows.max() if norm.largest else np.sqrt((rows**2).sum())
             found.append(float(size + kappa * d) * (1.0 + STRICT))
         return found
@@ -99,15 +135,14 @@ def gains(system: ExactSystem, metric: Metric) -> Gains:
     count = int(LONG / metric.alpha / float(step)) + 1
     none = np.zeros((system.n, 1))
     found = decay(metric, tuple(Piece(k * step, (k + 1) * step, none, none) for k in range(count)))
-    one = np.eye(system.n)
-    of_inputs, of_rates = (found.integral(metric, one, right) for right in (input_matrix(system), matrix(one)))
-    return Gains(system, metric, found, of_inputs, of_rates)
+    return Gains(system, metric, found, found.integral(metric, np.eye(system.n), matrix(np.eye(system.n))))
 
 
-def worst_inputs(form: StandardForm, norm: Norm, W: Array) -> Signal:
-    """An input of |w_i| = W_i that switches as the linear part needs it to make N large at its end.
+def worst_inputs(form: StandardForm, norm: Norm, bounds: Bounds) -> Array:
+    """Inputs (SAMPLES + 1, m) within the bounds at even times that the linear part makes a large N of at the end.
 
-    w = W sign(c e^(A(T − t)) B), and c the direction in which N grows, over and over.
+    The best for c x(T) is found for directions c in which N grows, over and over: of independent inputs, which are held
+    over a step, by the signs of their kernel, and of heights that run straight from time to time by linear programming.
     """
     stop = MEMORY / -float(np.linalg.eigvals(form.A).real.max())
     step = stop / SAMPLES
@@ -115,22 +150,51 @@ def worst_inputs(form: StandardForm, norm: Norm, W: Array) -> Signal:
     kernel[-1] = expm(form.A * step / 2.0) @ form.B * step
     for k in range(SAMPLES - 1, 0, -1):
         kernel[k - 1] = over @ kernel[k]
-    best, signs = 0.0, np.ones((SAMPLES, len(W)))
-    for row in norm.T:
+    best, found = 0.0, np.zeros((SAMPLES + 1, len(bounds.sizes)))
+    gained = np.abs(np.einsum("pn,knm->kpm", norm.T, kernel)).sum(axis=0) @ bounds.sizes
+    for row in norm.T[np.argsort(-gained)[: STARTS if bounds.tied else len(gained)]]:
         c = row
-        for _ in range(1 if norm.largest else TURNS):
-            tried = np.where(np.tensordot(c, kernel, (0, 1)) < 0.0, -1.0, 1.0)
-            end = np.einsum("knm,km->n", kernel, tried * W)
+        for _ in range(1 if norm.largest else TURNS_TIED if bounds.tied else TURNS):
+            tried = (_ramps if bounds.tied else _switches)(np.tensordot(c, kernel, (0, 1)), bounds.sizes, step)
+            end = np.einsum("knm,km->n", kernel, (tried[:-1] + tried[1:]) / 2.0 if bounds.tied else tried[:-1])
             if norm(end) > best:
-                best, signs = float(norm(end)), tried
+                best, found = float(norm(end)), tried
             c = norm.T.T @ (norm.T @ end)
-    switches = [0, *(np.flatnonzero(np.any(signs[1:] != signs[:-1], axis=1)) + 1).tolist()]
-    pieces = [Constant(k * step, np.zeros(1, complex), (W * signs[k])[:, None].astype(complex)) for k in switches]
-    return Signal(tuple(pieces))
+    return found
 
 
-def reached(form: StandardForm, signal: Signal, norm: Norm) -> float:
-    """sup N(x) of the motion from rest under an input that `worst_inputs` made."""
-    stop = MEMORY / -float(np.linalg.eigvals(form.A).real.max())
-    start = np.zeros((len(form.A), 1))
-    return max(float(norm(x).max()) for _, x in motions(form, signal, start, stop, stop / SAMPLES))
+def _switches(weights: Array, W: Array, step: float) -> Array:
+    signs = np.where(weights < 0.0, -1.0, 1.0)
+    return W * np.concatenate([signs, signs[-1:]])
+
+
+def _ramps(weights: Array, W: Array, step: float) -> Array:
+    """Σ weights (w_k + w_(k+1))/2 made largest over heights with h_0 = 0, |h_k| ≤ A, |h_(k+1) − h_k| ≤ V step."""
+    half, steps = len(W) // 2, len(weights)
+    found = np.zeros((steps + 1, 2 * half))
+    difference = diags([-np.ones(steps), np.ones(steps)], [0, 1], shape=(steps, steps + 1), format="csr")
+    for i, (A, V) in enumerate(zip(W[:half].tolist(), W[half:].tolist(), strict=True)):
+        value = np.convolve(weights[:, i], [0.5, 0.5]) + difference.T @ weights[:, half + i] / step
+        limits = [(0.0, 0.0), *[(-A, A)] * steps]
+        rows = vstack([difference, -difference])
+        h = linprog(-value, rows, np.full(2 * steps, V * step), bounds=limits, method="highs").x
+        found[:, i], found[:-1, half + i] = h, np.diff(h) / step
+    found[-1, half:] = found[-2, half:]
+    return found
+
+
+def reached(form: StandardForm, norm: Norm, bounds: Bounds, inputs: Array) -> float:
+    """sup N(x) of the motion from rest under inputs that `worst_inputs` made."""
+    step = MEMORY / -float(np.linalg.eigvals(form.A).real.max()) / SAMPLES
+    x, most, heights = np.zeros(len(form.A)), 0.0, np.arange(inputs.shape[1]) < inputs.shape[1] // 2
+    for before, after in pairwise(inputs):
+        last = np.where(heights & bounds.tied, after, before)
+        w0, w1, w2 = (v[:, None] for v in (before, (before + last) / 2.0, last))
+        y = x[:, None]
+        k1 = form.rate(y, w0)
+        k2 = form.rate(y + 0.5 * step * k1, w1)
+        k3 = form.rate(y + 0.5 * step * k2, w1)
+        k4 = form.rate(y + step * k3, w2)
+        x = x + step / 6.0 * (k1 + 2.0 * (k2 + k3) + k4)[:, 0]
+        most = max(most, float(norm(x)))
+    return most

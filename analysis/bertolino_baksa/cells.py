@@ -56,13 +56,16 @@ class Decay:
         root = np.sqrt(len(norm.T)) if norm.largest else 1.0
         return float(last * root * (1 + EPS) + self._rounding(metric.S, inverse, rest))
 
-    def integral(self, metric: Metric, left: Array, right: arb_mat) -> Array:
-        """Γ (p, q) ≥ ∫_0^∞ |left e^(At) right| dt, entry by entry; left (p, n) exact, right (n, q).
+    def integral(self, metric: Metric, left: Array, right: arb_mat, near: Array | None = None) -> Array:
+        """Γ (p, q) ≥ ∫_0^∞ |left e^(At) right − u| dt, entry by entry; left (p, n) exact, right (n, q).
+
+        near : values (N + 1, p, q) of u at the cells' ends, linear between them and 0 from the last on; none: u = 0.
 
         On a cell by the trapezium of its ends, as |chord| is convex; what comes after the last cell by ‖·‖_S.
         """
         centre, rest = rounded(right)
-        sizes, bend = np.abs(left @ self.ends @ centre), np.abs(left) @ self.curve @ np.abs(centre)
+        values = left @ self.ends @ centre
+        sizes, bend = np.abs(values if near is None else values - near), np.abs(left) @ self.curve @ np.abs(centre)
         whole = (((sizes[:-1] + sizes[1:]) / 2 + bend) * self.width[:, None, None]).sum(axis=0)
         off = self._rounding(left, centre, rest) * self.width.sum()
         start = np.sqrt(((metric.S @ self.ends[-1] @ centre) ** 2).sum(axis=0)) * (1 + EPS)
@@ -85,10 +88,14 @@ def decay(metric: Metric, pieces: tuple[Piece, ...]) -> Decay:
     A = metric.A
     now, ends, off, dropped = matrix(np.eye(A.nrows())), [np.eye(A.nrows())], 0.0, 0.0
     A_size, S_size = np.abs(rounded(A)[0]), float(np.linalg.norm(metric.S)) * (1 + EPS)
+    steps: dict[tuple[int, int], arb_mat] = {}  # e^(AΔ) by Δ's numerator and denominator
     for p, count in zip(pieces, counts(pieces, metric), strict=True):
-        over = (A * (arb(p.duration) / count)).exp()
+        width = p.duration / count
+        key = int(width.p), int(width.q)
+        if key not in steps:
+            steps[key] = (A * arb(width)).exp()
         for _ in range(count):
-            now = over * now
+            now = steps[key] * now
             centre, rest = rounded(now)
             ends.append(centre)
             off = max(off, rest)

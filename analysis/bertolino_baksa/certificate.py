@@ -1,22 +1,23 @@
 """Certificates: the statement of definition 2.1 in words and numbers, with all that is needed to prove it anew.
 
-A certificate is made by `certify` and judged by `verify`, which shares no step with how the pieces and the table were
-found: it proves the claims from the certificate's own numbers, by defect and logarithmic norm.
+`certify` finds pieces and a table of δ(ε); `verify` proves a certificate's claims from its own numbers, by defect and
+logarithmic norm, however they were found. The proof itself (`proof.prove`, `Proof.epsilon`) and the exact
+equations serve both: a fault in them would be made twice. What is independent of them is `adversary`.
 """
 
 from __future__ import annotations
 
 import hashlib
 import json
-import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from flint import fmpq
 
 from ..errors import InputError
+from . import strict
 from .balls import Array, ExactSystem, NotProvedError, precision
 from .norms import Norm, proved_metric
 from .proof import Proof, prove
@@ -39,6 +40,7 @@ THEOREM = (
 )
 Build = Callable[[dict[str, Any]], ExactSystem]
 Norms = Callable[[Array], tuple[Norm, ...]]
+Read = TypeVar("Read")
 
 
 @dataclass(frozen=True, slots=True)
@@ -160,37 +162,52 @@ def verify(certificate: Certificate, build: Build) -> Proof:
         system = build(certificate.model)
         proof = prove(system, proved_metric(system, certificate.S), certificate.pieces, certificate.x0.tolist())
         for claim in certificate.claims:
-            epsilon = proof.epsilon(claim.norm, claim.table[:, 1])
-            for (claimed, delta), proved in zip(claim.table.tolist(), epsilon.tolist(), strict=True):
-                if not proved <= claimed:
-                    raise NotProvedError(
-                        f"{claim.norm.name} norm, delta = {delta!r}: claimed eps = {claimed!r}, proved {proved!r}"
-                    )
+            refuse_unproved(claim, proof.epsilon(claim.norm, claim.table[:, 1]).tolist())
     return proof
+
+
+def refuse_unproved(claim: Claim, epsilon: Sequence[float]) -> None:
+    """Raise NotProvedError with the first row of the claim's table whose ε is below what is proved of its δ."""
+    for (claimed, delta), proved in zip(claim.table.tolist(), epsilon, strict=True):
+        if not proved <= claimed:
+            raise NotProvedError(
+                f"{claim.norm.name} norm, delta = {delta!r}: claimed eps = {claimed!r}, proved {proved!r}"
+            )
 
 
 def to_json(certificate: Certificate) -> bytes:
     """The certificate as a file's bytes, with the hash of its content."""
-    content = {
-        "format": FORMAT,
-        "theorem": THEOREM,
-        "model": certificate.model,
-        "x0": certificate.x0.tolist(),
-        "metric": certificate.S.tolist(),
-        "claims": [
-            {
-                "norm": {"name": c.norm.name, "largest": c.norm.largest, "T": c.norm.T.tolist()},
-                "l": c.floor,
-                "delta of eps": [{"eps": e, "delta": d} for e, d in c.table.tolist()],
-            }
-            for c in certificate.claims
-        ],
-        "pieces": [
-            {"begin": str(p.begin), "end": str(p.end), "x_lin": p.linear.tolist(), "e": p.error.tolist()}
-            for p in certificate.pieces
-        ],
-    }
+    return sealed(
+        {
+            "format": FORMAT,
+            "theorem": THEOREM,
+            "model": certificate.model,
+            "x0": certificate.x0.tolist(),
+            "metric": certificate.S.tolist(),
+            "claims": claims_json(certificate.claims),
+            "pieces": [
+                {"begin": str(p.begin), "end": str(p.end), "x_lin": p.linear.tolist(), "e": p.error.tolist()}
+                for p in certificate.pieces
+            ],
+        }
+    )
+
+
+def sealed(content: dict[str, Any]) -> bytes:
+    """A file's bytes: the content after its hash."""
     return json.dumps({"sha256": _hash(content), **content}, indent=1, allow_nan=False).encode() + b"\n"
+
+
+def claims_json(claims: Sequence[Claim]) -> list[dict[str, Any]]:
+    """Claims as plain data."""
+    return [
+        {
+            "norm": {"name": c.norm.name, "largest": c.norm.largest, "T": c.norm.T.tolist()},
+            "l": c.floor,
+            "delta of eps": [{"eps": e, "delta": d} for e, d in c.table.tolist()],
+        }
+        for c in claims
+    ]
 
 
 def _hash(content: dict[str, Any]) -> str:
@@ -199,49 +216,61 @@ def _hash(content: dict[str, Any]) -> str:
 
 def from_json(data: bytes, where: str) -> Certificate:
     """Read a certificate. Raises InputError if it is not one, or if it was altered."""
+    return opened(data, where, certificate_of)
+
+
+def opened(data: bytes, where: str, read: Callable[[dict[str, Any]], Read]) -> Read:
+    """What `read` makes of a file's content. Raises InputError if it cannot be read, or if it was altered."""
     if len(data) > MAX_BYTES:
         raise InputError(f"{where}: wanted at most {MAX_BYTES} bytes, got {len(data)}")
     try:
-        content = json.loads(data)
+        content = strict.loads(data)
         stated = content.pop("sha256")
-        if content["format"] != FORMAT:
+        if type(content["format"]) is not int or content["format"] != FORMAT:
             raise InputError(f"{where}: wanted a certificate of format {FORMAT}, got {content['format']!r}")
         if stated != _hash(content):
             raise InputError(f"{where}: the content does not have the hash that it states: it was altered")
-        return _certificate(content)
+        return read(content)
     except (KeyError, TypeError, ValueError, AttributeError, RecursionError, ZeroDivisionError, OverflowError) as error:
         raise InputError(f"{where}: cannot be read as a certificate: {type(error).__name__}: {error}") from error
 
 
-def _certificate(content: dict[str, Any]) -> Certificate:
-    x0 = _numbers(content["x0"], 1)
+def certificate_of(content: dict[str, Any]) -> Certificate:
+    """The certificate from its plain data; raises what reading wrong data raises."""
+    strict.of_keys(content, ("format", "theorem", "model", "x0", "metric", "claims", "pieces"))
+    strict.theorem(content["theorem"], THEOREM)
+    x0 = strict.numbers(content["x0"], 1)
     n = len(x0)
     pieces = []
     for p in content["pieces"]:
-        linear, error = _numbers(p["x_lin"], 2), _numbers(p["e"], 2)
+        strict.of_keys(p, ("begin", "end", "x_lin", "e"))
+        linear, error = strict.numbers(p["x_lin"], 2), strict.numbers(p["e"], 2)
         if not (linear.shape == error.shape and len(linear) == n and 2 <= linear.shape[1] <= 100):
             raise ValueError(f"a piece has coefficients of the shapes {linear.shape} and {error.shape}")
-        begin, end = (fmpq(*map(int, str(p[key]).split("/"))) for key in ("begin", "end"))
+        begin, end = strict.fraction(p["begin"]), strict.fraction(p["end"])
         if not end > begin:
             raise ValueError(f"a piece runs from {begin} to {end}")
         pieces.append(Piece(begin, end, linear, error))
+    S, model, claims = system_of(content, n)
+    if not pieces:
+        raise ValueError("wanted pieces")
+    return Certificate(model, x0, S, tuple(pieces), claims)
+
+
+def system_of(content: dict[str, Any], n: int) -> tuple[Array, dict[str, Any], tuple[Claim, ...]]:
+    """Metric, model and claims of n states from plain data; raises ValueError where they cannot be."""
     claims = []
     for c in content["claims"]:
-        table = _numbers([[row["eps"], row["delta"]] for row in c["delta of eps"]], 2)
-        if not (np.all(np.diff(table, axis=0) >= 0.0) and table[0, 1] > 0.0 and table[0, 0] == c["l"]):
+        norm = strict.of_keys(strict.of_keys(c, ("norm", "l", "delta of eps"))["norm"], ("name", "largest", "T"))
+        rows = [strict.of_keys(row, ("eps", "delta")) for row in c["delta of eps"]]
+        table, floor = strict.numbers([[row["eps"], row["delta"]] for row in rows], 2), strict.numbers(c["l"], 0)
+        if not (np.all(np.diff(table, axis=0) >= 0.0) and table[0, 1] > 0.0 and table[0, 0] == floor):
             raise ValueError("delta(eps) must rise, from l and a delta > 0 on")
-        T = _numbers(c["norm"]["T"], 2)
+        T = strict.numbers(norm["T"], 2)
         if T.shape != (n, n):
             raise ValueError(f"a norm has the shape {T.shape}")
-        claims.append(Claim(Norm(str(c["norm"]["name"]), T, c["norm"]["largest"] is True), table))
-    S = _numbers(content["metric"], 2)
-    if S.shape != (n, n) or not pieces or not claims or not isinstance(content["model"], dict):
-        raise ValueError("wanted a metric of the states, pieces, claims and a model")
-    return Certificate(content["model"], x0, S, tuple(pieces), tuple(claims))
-
-
-def _numbers(values: Any, dimensions: int) -> Array:
-    array = np.array(values, dtype=float)
-    if array.ndim != dimensions or not all(map(math.isfinite, array.ravel().tolist())):
-        raise ValueError(f"wanted {dimensions}-dimensional finite numbers, got {str(values)[:60]}")
-    return array
+        claims.append(Claim(Norm(strict.text(norm["name"]), T, strict.truth(norm["largest"])), table))
+    S = strict.numbers(content["metric"], 2)
+    if S.shape != (n, n) or not claims or not isinstance(content["model"], dict):
+        raise ValueError("wanted a metric of the states, claims and a model")
+    return S, content["model"], tuple(claims)

@@ -1,99 +1,98 @@
-"""`python -m analysis certify SCENARIO --bounded A`: every road of |h| ≤ A under a scenario's car, around ψ = 0."""
+"""`python -m analysis certify SCENARIO --bounded A [--slope V]`: every road of |h| ≤ A, |ḣ| ≤ V, around ψ = 0."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
-from functools import partial
+from collections.abc import Mapping
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from fmu_src.quantities import STATES
 
-from ..bertolino_baksa.balls import Array, NotProvedError, precision
-from ..bertolino_baksa.bounded_inputs import Gains, gains, reached, worst_inputs
+from ..bertolino_baksa.balls import NotProvedError, precision
+from ..bertolino_baksa.bounded_certificate import BoundedCertificate, certify, largest, to_json
+from ..bertolino_baksa.bounded_inputs import Bounds, Driven, Gains, gains, reached, worst_inputs
 from ..bertolino_baksa.norms import proved_metric
 from ..car import car_form
 from ..errors import InputError
+from ..files import write_whole
 from ..reference import Parameters, car_of
 from .car_certificates import build, metric_of, model_of
 from .exact_car import norms
 
-CLOSE = 1.01  # ratio at which a bisection stops
-SHARES = (0.25, 0.5, 0.75, 1.0)  # of the largest δ, in the table of δ(ε)
-LEAST = 1e-6  # of the first number: where a search ends
+
+def flat(parameters: Mapping[str, Any]) -> dict[str, Any]:
+    """The model of the car alone."""
+    return model_of({**parameters, "profile": "flat"})
 
 
 def car_gains(parameters: Mapping[str, Any]) -> Gains:
     """Gains of the car of these parameters. Raises NotProvedError if its linear part does not contract."""
-    flat = {**parameters, "profile": "flat"}
-    car = car_of(dict(flat))
     with precision(2):
-        system = build(model_of(flat))
-        return gains(system, proved_metric(system, metric_of(car)))
+        system = build(flat(parameters))
+        return gains(system, proved_metric(system, metric_of(car_of(dict(parameters)))))
 
 
-def heights(parameters: Parameters, A: float) -> Array:
-    """W (8,) of (h, ḣ). Raises InputError unless A > 0, or for tyres with dampers, which feel rates without bound."""
+def heights(parameters: Parameters, A: float, V: float | None = None) -> Bounds:
+    """Bounds of (h, ḣ) (8); without V, of roads of any slope.
+
+    Raises InputError unless A, V > 0, or without V for tyres with dampers, which feel slopes without bound.
+    """
     if not 0.0 < A < math.inf:
         raise InputError(f"--bounded {A!r}: wanted a height in metres, greater than 0")
+    if V is not None:
+        if not 0.0 < V < math.inf:
+            raise InputError(f"--slope {V!r}: wanted a rate of height in metres per second, greater than 0")
+        return Bounds(np.array([A] * 4 + [V] * 4), tied=True)
     car = car_of(parameters)
     if car.bp1 or car.bp2:
         raise InputError(
             f"--bounded: bp1 = {car.bp1!r}, bp2 = {car.bp2!r} N s/m: a bounded road may have any slope, of which these "
-            "dampers make any force; wanted tyres without dampers"
+            "dampers make any force; wanted tyres without dampers, or --slope"
         )
-    return np.array([A] * 4 + [0.0] * 4)
+    return Bounds(np.array([A] * 4 + [0.0] * 4))
 
 
-def largest(proved: Callable[[float], object], first: float) -> float:
-    """Largest number, to CLOSE, for which proved(number) raises no NotProvedError; from `first` on up or down."""
-    good, bad, middle = 0.0, math.inf, first
-    while bad > CLOSE * good and middle > LEAST * first:
-        try:
-            proved(middle)
-            good = middle
-        except NotProvedError:
-            bad = middle
-        middle = 2.0 * good if bad == math.inf else (math.sqrt(good * bad) if good else bad / 2.0)
-    return good
-
-
-def command(parameters: Parameters, A: float) -> int:
-    """Print what is proved of all roads of |h| ≤ A [m]; 0, or 1 if nothing is."""
-    W = heights(parameters, A)
+def command(parameters: Parameters, A: float, V: float | None, where: Path | None) -> int:
+    """Print what is proved of all roads of |h| ≤ A [m] (|ḣ| ≤ V [m/s]), write it; 0, or 1 if nothing is."""
+    bounds = heights(parameters, A, V)
     try:
         with precision(2):
-            for line in _statement(parameters, A, W):
+            found = car_gains(parameters)
+            driven = found.under(bounds)
+            certificate = certify(flat(parameters), driven, norms(car_of(parameters), driven.states[:, None]))
+            for line in statement(certificate, driven):
                 print(line, flush=True)
+            top = largest(lambda A: found.under(heights(parameters, A, V)).motion(np.zeros(14)), A)
+            print(f"  proved up to A = {top:.4g} m")
     except NotProvedError as error:
         print(f"no certificate: {error}")
         return 1
+    if where is not None:
+        write_whole(where, to_json(certificate))
+        print(f"{where}: written")
     return 0
 
 
-def _statement(parameters: Parameters, A: float, W: Array) -> list[str]:
-    found, form = car_gains(parameters), car_form(car_of(parameters))
-    rest = np.zeros(14)
-    states, _ = found.motion(W, rest)
-    top = largest(lambda height: found.motion(heights(parameters, height), rest), A)
+def statement(certificate: BoundedCertificate, driven: Driven) -> list[str]:
+    """What is proved, each number beside what a road of the class reaches from rest."""
+    bounds, form = certificate.bounds, car_form(car_of(certificate.model["parameters"]))
+    slope = f" and |dh/dt| <= {bounds.sizes[4]:g} m/s that begins at 0" if bounds.tied else ""
+    with precision(2):
+        states, _ = driven.motion(np.zeros(14))
     named = ", ".join(f"{q.name} {y:.3g} {q.unit}" for q, y in zip(STATES[:7], states[:7].tolist(), strict=True))
     lines = [
-        f"psi = 0 is almost stable under every road of |h| <= {A:g} m, whatever its course; proved up to {top:.4g} m",
+        f"psi = 0 is almost stable (definition 2.1) under every road with |h| <= {bounds.sizes[0]:g} m{slope}, "
+        "whatever its course:",
         f"  from rest: {named}",
     ]
-    for norm in norms(car_of(parameters), (found.of_inputs @ W)[:, None]):
-        most, spread = reached(form, worst_inputs(form, norm, W), norm), found.spread(norm)
-        floor = found.epsilon(W, norm, [0.0])[0]
-        ratio = f" (a bang-bang road reaches {most:.4g}: ratio {floor / most:.3g})"
-        top = largest(partial(_moved, found, W, spread), floor)
-        delta = [share * top for share in SHARES]
-        table = ", ".join(f"{e:.4g} for {d:.4g}" for e, d in zip(found.epsilon(W, norm, delta), delta, strict=True))
-        lines.append(f"  {norm.name} norm: l = {floor:.4g}{ratio}; eps for delta: {table}")
+    for claim in certificate.claims:
+        most = reached(form, claim.norm, bounds, worst_inputs(form, claim.norm, bounds))
+        table = ", ".join(f"{e:.4g} for {d:.4g}" for e, d in claim.table[1:].tolist())
+        lines.append(
+            f"  {claim.norm.name} norm: l = {claim.floor:.4g} (a worst road reaches {most:.4g}: "
+            f"ratio {claim.floor / most:.3g}); eps for delta: {table}"
+        )
     return lines
-
-
-def _moved(found: Gains, W: Array, spread: Array, delta: float) -> None:
-    """Raise NotProvedError unless motions that start within δ are bounded."""
-    found.motion(W, spread * delta)

@@ -8,9 +8,14 @@ from typing import Any
 import numpy as np
 from flint import fmpq
 
+from fmu_src.controller.lqr_controller import LqrController
 from fmu_src.quantities import ParameterError
+from fmu_src.road.profiles import PROFILE
+from fmu_src.road.road_excitation import RoadExcitation
 from fmu_src.vehicle.parameters import Car
+from fmu_src.vehicle.vehicle7dof import CAR, SAMPLING
 
+from ..bertolino_baksa import strict
 from ..bertolino_baksa.balls import ExactSystem, NotProvedError, precision
 from ..bertolino_baksa.certificate import Certificate, certify
 from ..bertolino_baksa.norms import Norm, modal_metric, proved_metric
@@ -24,12 +29,29 @@ from .exact_car import energy_norm, exact_system, norms
 
 AFTER_REST = (7.0, 14.0)  # the pieces last so many times 1/α beyond the last corner if the road then is flat,
 AFTER_PERIODIC = (10.0, 12.0, 16.0, 22.0)  # and so many if it goes on: what is left of the start is as small as e^−10 …
+KINDS: dict[str, type] = {
+    **dict.fromkeys((*CAR, *RoadExcitation.reals), float),
+    PROFILE.name: str,
+    **dict.fromkeys(RoadExcitation.switches, bool),
+}  # of the parameters of car and road
+OTHERS = {
+    *LqrController.reals,
+    *LqrController.switches,
+    *(c.name for c in LqrController.choices),
+    SAMPLING.name,
+    "h_max",
+}
+WORDS = {float: "number with a decimal point", str: "word", bool: "truth value, true or false"}
 ROUND_OFF = 1e-9  # of the largest eigenvalue: a decay below it is not told from none
 
 
 def model_of(parameters: Mapping[str, Any], gain: Array | None = None) -> dict[str, Any]:
-    """The model of a certificate: the parameters of car and road, and a constant gain (u = −gain x)."""
-    model: dict[str, Any] = {"kind": "car", "parameters": dict(parameters)}
+    """The model of a certificate: the parameters of car and road, and a constant gain (u = −gain x).
+
+    Parameters of the controller and of the co-simulation have no part in it.
+    """
+    ours = {name: value for name, value in parameters.items() if name in KINDS or name not in OTHERS}
+    model: dict[str, Any] = {"kind": "car", "parameters": ours}
     return model if gain is None else {**model, "gain": gain.tolist()}
 
 
@@ -42,12 +64,24 @@ def build(model: dict[str, Any]) -> ExactSystem:
 
 
 def _checked(model: dict[str, Any]) -> tuple[Parameters, Array | None]:
+    if unknown := set(model) - {"kind", "parameters", "gain"}:
+        raise InputError(f"model: wanted kind, parameters and perhaps a gain, got {', '.join(sorted(unknown))}")
     parameters = model.get("parameters")
     if not isinstance(parameters, dict):
         raise InputError(f"model: wanted parameters by name, got {parameters!r}")
-    gain = None if model.get("gain") is None else np.array(model["gain"], dtype=float)
-    if gain is not None and (gain.shape != (4, 14) or not np.all(np.isfinite(gain))):
-        raise InputError(f"model: wanted a gain of 4 x 14 finite numbers, got the shape {gain.shape}")
+    for name, value in parameters.items():
+        if name not in KINDS:
+            raise InputError(f"model: {name}: no parameter of car or road; known are {', '.join(KINDS)}")
+        if not isinstance(value, KINDS[name]) or isinstance(value, bool) is not (KINDS[name] is bool):
+            raise InputError(f"model: {name} = {value!r}: wanted a {WORDS[KINDS[name]]}")
+    if "gain" not in model:
+        return parameters, None
+    try:
+        gain = strict.numbers(model["gain"], 2)
+    except ValueError as error:
+        raise InputError(f"model: gain: {error}") from error
+    if gain.shape != (4, 14):
+        raise InputError(f"model: wanted a gain of 4 x 14 numbers, got the shape {gain.shape}")
     return parameters, gain
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -13,8 +14,11 @@ from fmu_src.vehicle.equations import equations_of_motion
 
 from ..bertolino_baksa.adversary import reference_floor
 from ..bertolino_baksa.balls import NotProvedError, precision
+from ..bertolino_baksa.bounded_certificate import KIND, BoundedCertificate
+from ..bertolino_baksa.bounded_certificate import certificate_of as bounded_of
+from ..bertolino_baksa.bounded_certificate import verify as verify_bounded
 from ..bertolino_baksa.cells import errors_of_states, outputs
-from ..bertolino_baksa.certificate import Certificate, from_json, to_json, verify
+from ..bertolino_baksa.certificate import Certificate, certificate_of, opened, to_json, verify
 from ..bertolino_baksa.norms import proved_metric
 from ..bertolino_baksa.proof import Proof
 from ..bertolino_baksa.quick import quick_floors
@@ -23,6 +27,7 @@ from ..files import write_whole
 from ..methods.linear_response import linear_response
 from ..reference import Parameters, car_of, road_parameters
 from ..tyres import static_loads_of
+from .car_bounded_roads import statement as every_road
 from .car_certificates import build, certify_car, metric_of, model_of, prove_reference, stops
 from .certificate_figures import adversary_points, draw_delta
 from .exact_car import exact_car, norms
@@ -54,16 +59,23 @@ def make_certificate(parameters: Parameters, where: Path | None, *, largest: boo
 
 def judge_certificate(path: Path) -> int:
     """Prove a certificate's claims anew; 0 if all are proved, 1 if not."""
-    certificate = from_json(path.read_bytes(), str(path))
+    certificate = opened(path.read_bytes(), str(path), _any_kind)
     try:
-        proof = verify(certificate, build)
+        if isinstance(certificate, BoundedCertificate):
+            lines = every_road(certificate, verify_bounded(certificate, build))
+        else:
+            lines = statement(certificate, verify(certificate, build))
     except NotProvedError as error:
         print(f"{path}: NOT proved: {error}")
         return 1
-    for line in statement(certificate, proof):
+    for line in lines:
         print(line)
     print(f"{path}: every claim is proved")
     return 0
+
+
+def _any_kind(content: dict[str, Any]) -> Certificate | BoundedCertificate:
+    return bounded_of(content) if content.get("kind") == KIND else certificate_of(content)
 
 
 def quick_answer(parameters: Parameters) -> int:

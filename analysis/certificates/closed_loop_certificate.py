@@ -12,11 +12,13 @@ from pathlib import Path
 import numpy as np
 
 from fmu_src.controller.design import design
+from fmu_src.controller.hardware import Hardware
 from fmu_src.controller.law import control_parameters
 
 from ..bertolino_baksa.balls import NotProvedError
 from ..bertolino_baksa.certificate import Certificate, Claim, to_json
 from ..bertolino_baksa.proof import Proof
+from ..errors import InputError
 from ..files import write_whole
 from ..methods.polynomials import Array
 from ..reference import Parameters
@@ -28,9 +30,23 @@ SHARES = (0.01, 0.1, 0.5)  # of the smaller largest ε, at which δ is compared
 
 
 def infinite_gain(parameters: Parameters) -> Array:
-    """Gain (4, 14) of u = −gain x at the struts, by the controller of these parameters on its infinite horizon."""
+    """Gain (4, 14) of u = −gain x at the struts, by the controller of these parameters on its infinite horizon.
+
+    Raises InputError where hardware stands between the law and the struts.
+    """
+    refuse_hardware(parameters)
     K = np.array(design(control_parameters(parameters).model, infinite=True, span=None).infinite)
     return -strut_gain(K.reshape(2, 4)) if K.size == 8 else -K.reshape(4, 14)  # of the half car, of the full car
+
+
+def refuse_hardware(parameters: Parameters) -> None:
+    """Raise InputError, which names it, where the struts do not do at once what the law asks for."""
+    hardware = control_parameters(parameters).hardware
+    if not hardware.ideal:
+        names = ("actuators", "feedback", "force_limit", "actuator_lag", "sample_time")
+        found = [name for name in names if getattr(hardware, name) != getattr(Hardware(), name)]
+        got = ", ".join(f"{name} = {getattr(hardware, name)!r}" for name in found)
+        raise InputError(f"--closed-loop: the proof is of the law itself; wanted no hardware, got {got}")
 
 
 def both(parameters: Parameters) -> tuple[tuple[Certificate, Proof], tuple[Certificate, Proof]]:
