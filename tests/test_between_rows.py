@@ -225,6 +225,16 @@ def test_the_defect_is_within_what_is_allowed_by_little_more_than_it_must(bump: 
     assert 0.1 < measured[0] < 1.0 and measured[1] < 1.0 < measured[2]
 
 
+def test_neither_is_one_with_another_acceleration(bump: Run) -> None:
+    """Where accelerations are exported, they are those of the rows."""
+    values = bump.trajectory.values.copy()
+    values[250, bump.trajectory.names.index("axle_r.roll_acceleration")] += 0.01
+    other = replace(bump, trajectory=replace(bump.trajectory, values=values))
+    (authentic, rows, _), _ = certified_findings(other)
+    assert rows.holds and not authentic.holds
+    assert "rows 251 and 252, axle_r.roll, largest: 0.01 rad/s/s; 1 cell out" in authentic.source
+
+
 def scaled(size: float) -> Callable[[Array], None]:
     def change(states: Array) -> None:
         states[300:] *= 1.0 + size

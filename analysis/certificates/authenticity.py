@@ -74,17 +74,32 @@ class Defect:
     out: int  # number of cells that are out of what is allowed
 
 
-def defect(car: Car, road: KnownRoad, times: Array, x: Array, digits: Array, own: float) -> Defect:
-    """The defect along the quintics of rows x (N, 14) at times (N,) [s].
+@dataclass(frozen=True, slots=True)
+class Export:
+    """Rows (N,) that are judged, and how good they are."""
 
-    digits : of the rows (N, 14).  own : what the run may deviate from a motion, over each state's maximum.
-    """
+    times: Array  # [s]
+    x: Array  # (N, 14)
+    digits: Array  # (N, 14), what the printed digits leave open
+    accelerations: Array | None  # (N, 7), where they are exported too,
+    their_digits: Array | None  # (N, 7)
+    own: float  # what the run may deviate from a motion, over each state's maximum
+
+
+def defect(car: Car, road: KnownRoad, export: Export) -> Defect:
+    """The defect along the quintics, and that of the exported accelerations at each cell's end."""
+    x = export.x
     ends = np.stack([x[:-1], x[1:]], axis=2)
     rates = _accelerations(car, ends, road.ends.swapaxes(1, 2))
-    found = quintics(times, x, rates.swapaxes(1, 2))
+    found = quintics(export.times, x, rates.swapaxes(1, 2))
     sizes = np.abs(_accelerations(car, found.values, road.nodes) - found.slopes[:, 7:]).max(axis=2)
-    allowed = MISSED * _fourth_differences(rates[:, :, 0]) + GROWS * own * scales(rates[:, :, 0])
-    allowed += _digits(car, found.half, digits) + _open(car, road)
+    allowed = MISSED * _fourth_differences(rates[:, :, 0]) + GROWS * export.own * scales(rates[:, :, 0])
+    allowed += _digits(car, found.half, export.digits) + _open(car, road)
+    if export.accelerations is not None and export.their_digits is not None:
+        after = np.concatenate([rates[1:, :, 0], rates[-1:, :, 1]])  # at a corner of the road they may be of either side
+        wrong = [np.abs(export.accelerations[1:] - side) for side in (rates[:, :, 1], after)]
+        sizes = np.maximum(sizes, np.min(wrong, axis=0))
+        allowed += export.their_digits[1:]
     ratio = np.where(road.smooth[:, None], sizes / allowed, 0.0)
     cell, coordinate = (int(i) for i in np.unravel_index(np.argmax(ratio), ratio.shape))
     out = int(np.count_nonzero(~(ratio <= 1.0).all(axis=1)))

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
-from fmu_src.quantities import FORCES, ROAD_HEIGHTS, STATES
+from fmu_src.quantities import ACCELERATIONS, FORCES, ROAD_HEIGHTS, STATES
 
 from ..bertolino_baksa.balls import NotProvedError, precision
 from ..bertolino_baksa.norms import proved_metric
@@ -22,7 +21,7 @@ from ..methods.polynomials import Array
 from ..reference import car_of, road_of, road_parameters
 from ..scenario import read_scenario
 from ..trajectory import Run
-from .authenticity import KnownRoad, defect, profile, sampled
+from .authenticity import Export, KnownRoad, defect, profile, sampled
 from .car_certificates import metric_of
 from .exact_car import energy_norm, exact_system
 from .exported import read_export
@@ -57,51 +56,46 @@ def certified_findings(
             return np.spacing(np.abs(columns.columns([*names])))[: len(t)]
         return np.stack([rounding[name] for name in names], axis=1)[: len(t)]
 
-    names, heights = [q.name for q in STATES], [q.name for q in ROAD_HEIGHTS]
-    export = Export(run, t, columns.columns(names)[: len(t)], digits(names), own_error(run), file)
+    def of(names: Sequence[str]) -> tuple[Array, Array]:
+        return columns.columns([*names])[: len(t)], digits(names)
+
+    x, open_ = of([q.name for q in STATES])
+    names = [q.name for q in ACCELERATIONS]
+    more, more_open = of(names) if set(names) <= set(columns.names) else (None, None)
+    export = Export(t, x, open_, more, more_open, own_error(run))
     if roads is None:
-        return _on_its_road(export)
-    return _on_roads(export, columns.columns(heights)[: len(t)], digits(heights), roads)
+        return _on_its_road(run, export, file)
+    return _on_roads(run, export, file, roads, *of([q.name for q in ROAD_HEIGHTS]))
 
 
-@dataclass(frozen=True, slots=True)
-class Export:
-    """Rows of a run that are judged: times [s], states (N, 14), and what their digits and the integrator leave open."""
-
-    run: Run
-    times: Array
-    x: Array
-    digits: Array
-    own: float
-    file: str
-
-
-def _on_its_road(export: Export) -> tuple[list[Finding], str]:
-    parameters, t, findings = export.run.parameters, export.times, []
+def _on_its_road(run: Run, export: Export, file: str) -> tuple[list[Finding], str]:
+    parameters, t, findings = run.parameters, export.times, []
     try:
         known = profile(road_signal(road_parameters(parameters)), road_of(parameters).corners(t[-1]), t)
-        findings = [_authentic(export, known)]
-        found = _motions(export.run, t, export.x[0], export.digits[0])
+        findings = [_authentic(run, export, file, known)]
+        found = _motions(run, t, export.x[0], export.digits[0])
     except NotProvedError as error:
         return findings, str(error)
     expected, e, off = found.at(t)
     rows = judged(export.x, expected, off + export.digits + export.own * scales(expected), e)
     bound = found.largest_error(energy_norm(car_of(parameters)))
-    return [*findings, _of_rows(export, rows), _between_rows(export, rows, bound, "this road")], ""
+    return [*findings, _of_rows(export, rows, file), _between_rows(run, rows, bound, "this road")], ""
 
 
-def _on_roads(export: Export, heights: Array, rounding: Array, roads: RoadClass) -> tuple[list[Finding], str]:
+def _on_roads(
+    run: Run, export: Export, file: str, roads: RoadClass, heights: Array, rounding: Array
+) -> tuple[list[Finding], str]:
     allowed = export.own * scales(export.x) + export.digits
     fits = samples(export.times, export.x, allowed, heights, rounding, roads)
-    findings = [_authentic(export, sampled(fits))]
+    findings = [_authentic(run, export, file, sampled(fits))]
     try:
-        everywhere = _everywhere(export.run, fits)
+        everywhere = _everywhere(run, fits)
     except NotProvedError as error:
         return findings, str(error)
     rows = everywhere.rows(export.x, allowed)
-    bound = everywhere.found.largest_error(energy_norm(car_of(export.run.parameters)))
-    between = _between_rows(export, rows, bound, f"every road of class {roads} on which a motion has these rows")
-    return [*findings, _of_rows(export, rows), between], ""
+    bound = everywhere.found.largest_error(energy_norm(car_of(run.parameters)))
+    between = _between_rows(run, rows, bound, f"every road of class {roads} on which a motion has these rows")
+    return [*findings, _of_rows(export, rows, file), between], ""
 
 
 def judge_export(path: Path, road_class: str | None, scenario: str | None) -> int:
@@ -135,8 +129,8 @@ def _everywhere(run: Run, known: Samples) -> AllRoads:
         return on_all_roads(system, proved_metric(system, metric_of(car)), known)
 
 
-def _authentic(export: Export, road: KnownRoad) -> Finding:
-    found = defect(car_of(export.run.parameters), road, export.times, export.x, export.digits, export.own)
+def _authentic(run: Run, export: Export, file: str, road: KnownRoad) -> Finding:
+    found = defect(car_of(run.parameters), road, export)
     coordinate, cells = STATES[found.coordinate].name, "1 cell" if found.out == 1 else f"{found.out} cells"
     return Finding(
         claim="the export obeys the equations between its rows: their defect along quintics through the rows, over "
@@ -146,12 +140,12 @@ def _authentic(export: Export, road: KnownRoad) -> Finding:
         expected=0.0,
         tolerance=1.0,
         unit="1",
-        source=f"{export.file}, rows {found.cell + 2} and {found.cell + 3}, {coordinate}, largest: {found.size:.2g} "
+        source=f"{file}, rows {found.cell + 2} and {found.cell + 3}, {coordinate}, largest: {found.size:.2g} "
         f"{STATES[found.coordinate + 7].unit}/s; {cells} out",
     )
 
 
-def _of_rows(export: Export, rows: Rows) -> Finding:
+def _of_rows(export: Export, rows: Rows, file: str) -> Finding:
     first = "" if rows.first is None else f"; the first row out: {rows.first + 2}"
     return Finding(
         claim=f"no row is proved to be of another motion: distance from the proved tube of the motion from the first "
@@ -162,13 +156,13 @@ def _of_rows(export: Export, rows: Rows) -> Finding:
         expected=0.0,
         tolerance=1.0,
         unit="1",
-        source=f"{export.file}, row {rows.row + 2}, column {STATES[rows.state].name}, largest{first}",
+        source=f"{file}, row {rows.row + 2}, column {STATES[rows.state].name}, largest{first}",
     )
 
 
-def _between_rows(export: Export, rows: Rows, bound: float, road: str) -> Finding:
+def _between_rows(run: Run, rows: Rows, bound: float, road: str) -> Finding:
     """The bound is of the exact motion; the run's own error comes on top of it at its rows."""
-    norm = energy_norm(car_of(export.run.parameters))
+    norm = energy_norm(car_of(run.parameters))
     seen = float(norm(rows.e.T).max())
     own = float(np.linalg.norm(np.abs(norm.T) @ rows.allowed.max(axis=0)))
     return Finding(
