@@ -17,6 +17,7 @@ from analysis.bertolino_baksa.balls import NotProvedError
 from analysis.certificates.exact_car import energy_norm
 from analysis.certificates.exported import _rounding
 from analysis.certificates.run_certificates import _motions, certified_findings
+from analysis.certificates.unknown_roads import road_class
 from analysis.scenario import built_in_scenarios, read_scenario
 from analysis.trajectory import Run, write_csv
 from fmu_src.vehicle.parameters import Car
@@ -54,6 +55,15 @@ def test_what_is_proved_between_the_rows_is_sharp(bump: Run) -> None:
     found, norm = _motions(bump, t, x[0], np.zeros(14)), energy_norm(Car())
     _, e, _ = found.at(np.linspace(0.0, STOP, 6001))
     assert 1.0 <= found.largest_error(norm) / norm(e.T).max() < 1.01
+
+
+@pytest.mark.parametrize("roads", [None, "curv:45", "lip:0.72"])
+def test_neither_is_one_in_which_states_rest(roads: str | None) -> None:
+    """Both sides meet the bump at once: nothing rolls, though on other roads of the class it might."""
+    run = run_of("bump", parameters={"tau0": 0.0})
+    assert not np.any(run.trajectory["body.roll"])
+    findings, reason = certified_findings(run, roads=road_class(roads) if roads else None)
+    assert reason == "" and all(finding.holds for finding in findings)
 
 
 # ---------------------------------------------------------------------------------------------------- tampered runs
