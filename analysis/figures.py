@@ -35,7 +35,7 @@ READING = {
 """SI unit -> unit in which a value is read, and the factor to it."""
 
 BLUE, ORANGE, TEAL, PURPLE, RED = "#0077bb", "#ee7733", "#009988", "#aa3377", "#cc3311"  # Paul Tol, colour-blind-safe
-DASHED = (0, (5, 1.5))
+DASHED, DOTTED = (0, (5, 1.5)), (0, (1.5, 1.0))
 STYLE = {
     "font.family": "DejaVu Sans",  # comes with matplotlib: the same glyphs on every machine
     "font.size": 9.0,
@@ -150,16 +150,13 @@ def plot_heaves(trajectory: Trajectory, quantities: Sequence[Quantity], ax: Axes
     return finish(ax)
 
 
-def plot_comparison(controlled: Trajectory, uncontrolled: Trajectory, q: Quantity, ax: Axes) -> Axes:
-    """One quantity with (red) and without (blue, dashed) control forces."""
+def plot_comparison(curves: Sequence[tuple[Trajectory, str, Any, str]], q: Quantity, ax: Axes) -> Axes:
+    """One quantity of several runs, each with its colour, its dashes and how it is controlled."""
     unit, factor = READING[q.unit]
-    for trajectory, color, dashes, how in (
-        (controlled, RED, "-", "optimal stabilization"),
-        (uncontrolled, BLUE, DASHED, "without control forces"),
-    ):
+    for trajectory, color, dashes, how in curves:
         values = factor * trajectory[q.name]
-        ax.plot(trajectory.time, values, color=color, linestyle=dashes, label=f"{words(q)}, {how}")
-    ax.set_ylabel(axis_label((q,), unit))
+        ax.plot(trajectory.time, values, color=color, linestyle=dashes, label=how)
+    ax.set_ylabel(f"{words(q)} {axis_label((q,), unit)}")
     return finish(ax)
 
 

@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cache, partial
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -13,7 +14,12 @@ from fmu_src.quantities import CORNER_WORDS, FORCES, POSITIONS, ROAD_HEIGHTS, ST
 
 from .discrepancy import linear_states
 from .figures import (
+    BLUE,
+    DASHED,
+    DOTTED,
+    PURPLE,
     READING,
+    RED,
     Axes,
     Subject,
     Window,
@@ -46,11 +52,11 @@ class FigureEntry:
     caption: str
 
 
-def draw_all(run: Run, counterpart: Run | None, folder: Path) -> list[FigureEntry]:
+def draw_all(run: Run, counterpart: Run | None, folder: Path, other_design: Run | None = None) -> list[FigureEntry]:
     """Write `figures/*.svg` into the run's folder: all figures whose columns were recorded."""
     target = folder / FOLDER
     target.mkdir(exist_ok=True)
-    drawn = [subject for subject in subjects(run, counterpart) if not subject.missing]
+    drawn = [subject for subject in subjects(run, counterpart, other_design) if not subject.missing]
     for subject in drawn:
         write_whole(target / subject.file, render(subject))
     return [FigureEntry(subject.file, subject.title, subject.caption()) for subject in drawn]
@@ -73,12 +79,12 @@ def is_controlled(run: Run) -> bool:
     return bool(run.record["parameters"].get("controller", {}).get("enabled", False))
 
 
-def subjects(run: Run, counterpart: Run | None) -> list[Subject]:
+def subjects(run: Run, counterpart: Run | None, other_design: Run | None = None) -> list[Subject]:
     """All figures that this run can give; the controller's, if it or its counterpart has one at work."""
     pair = {is_controlled(each): each.trajectory for each in (run, counterpart) if each}
     made = _paper_figures(run)
     if len(pair) == 2:
-        made.append(_comparison(pair[True], pair[False]))
+        made.append(_comparison(pair[True], pair[False], other_design))
     if True in pair and _acts(pair[True]):
         made.append(_strut_forces(pair[True], "" if is_controlled(run) else " They are those of the counterpart run."))
     return [*made, _tyre_loads(run), _linear_approximation(run)]
@@ -148,18 +154,27 @@ def _acts(trajectory: Trajectory) -> bool:
     return not set(names) <= set(trajectory.names) or bool(trajectory.columns(names).any())
 
 
-def _comparison(controlled: Trajectory, uncontrolled: Trajectory) -> Subject:
+def _comparison(controlled: Trajectory, uncontrolled: Trajectory, other_design: Run | None) -> Subject:
+    curves: list[tuple[Trajectory, str, Any, str]] = [
+        (controlled, RED, "-", "optimal stabilization"),
+        (uncontrolled, BLUE, DASHED, "without control forces"),
+    ]
+    another = ""
+    if other_design:
+        name = f"{other_design.parameters.get('design', 'other')} design"
+        curves.append((other_design.trajectory, PURPLE, DOTTED, name))
+        another = f" Purple: {name}."
     return Subject(
         file="figure-09-stabilization.svg",
         title="Controlled against uncontrolled car",
         caption=lambda: (
-            "As figure 9 of the paper. Red: optimal stabilization; blue: without control forces. Heave z, up; pitch φ, "
-            "positive nose down (the paper's section 4 has it front up); below them roll ψ, which the half-car design "
-            "does not see. Here the car is the full one, with seven degrees of freedom; the paper's is the half car: "
-            "python -m analysis stabilize draws that, and figure 8."
+            f"As figure 9 of the paper. Red: optimal stabilization; blue: without control forces.{another} Heave z, "
+            "up; pitch φ, positive nose down (the paper's section 4 has it front up); below them roll ψ, which the "
+            "half-car design does not see. Here the car is the full one, with seven degrees of freedom; the paper's is "
+            "the half car: python -m analysis stabilize draws that, and figure 8."
         ),
-        panels=[partial(plot_comparison, controlled, uncontrolled, q) for q in (Z, PHI, PSI)],
-        sources=(controlled, uncontrolled),
+        panels=[partial(plot_comparison, curves, q) for q in (Z, PHI, PSI)],
+        sources=[trajectory for trajectory, *_ in curves],
         needs=(Z, PHI, PSI),
     )
 

@@ -4,19 +4,22 @@ from __future__ import annotations
 
 import json
 from dataclasses import replace
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from flint import fmpq
 
 from analysis.bertolino_baksa.adversary import excursions, reference_floor, worst
 from analysis.bertolino_baksa.balls import NotProvedError, precision
 from analysis.bertolino_baksa.certificate import Certificate, from_json, to_json, verify
-from analysis.bertolino_baksa.proof import Proof
+from analysis.bertolino_baksa.norms import proved_metric
+from analysis.bertolino_baksa.proof import Proof, prove
+from analysis.bertolino_baksa.tube import Piece, prove_linear
 from analysis.car import car_form, road_signal
-from analysis.certificates.car_certificates import build, certify_car, prove_reference
+from analysis.certificates.car_certificates import build, certify_car, model_of, prove_reference
 from analysis.cosimulation import simulate
 from analysis.methods.linear_response import linear_response
 from analysis.methods.signals import Signal
@@ -139,6 +142,22 @@ def test_a_corrupted_certificate_of_the_car_is_rejected(seed: int) -> None:
         bad = replace(certificate, pieces=tuple(pieces))
     with pytest.raises(NotProvedError):
         verify(bad, build)
+
+
+def test_a_piece_across_a_corner_of_the_road_is_rejected() -> None:
+    """At rest until 1 s, in one piece, though the bump comes at 0.5 s: w of its begin is not w of all of it."""
+    model, rest = model_of({"A": 0.05, "t_start": 0.5}), np.zeros((14, 2))
+    certificate, _ = certified(0.01)
+    with precision(2):
+        road = build(model)
+        metric, whole = proved_metric(road, certificate.S), Piece(fmpq(0), fmpq(1), rest, rest)
+        for judge in (partial(prove, x0=REST.tolist()), prove_linear):
+            with pytest.raises(NotProvedError, match="across a corner"):
+                judge(road, metric, (whole,))
+        halves = tuple(replace(whole, begin=fmpq(k, 2), end=fmpq(k + 1, 2)) for k in range(2))
+        with pytest.raises(NotProvedError, match="across a corner"):
+            prove_linear(road, metric, halves)
+        assert prove_linear(road, metric, halves[:1])[0] < 1e-20
 
 
 def test_too_large_a_bump_has_no_certificate_and_says_where_it_fails() -> None:

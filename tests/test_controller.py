@@ -6,6 +6,7 @@ import json
 import subprocess
 import sys
 import zipfile
+from dataclasses import replace
 from pathlib import Path
 from time import process_time
 from typing import Any
@@ -188,6 +189,9 @@ def folder(dist: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_a_step_longer_than_the_whole_control_is_refused_and_a_shorter_one_is_not(
     folder: Path, T: float, horizon: str, t: float, status: int
 ) -> None:
+    control = ControlParameters(tau0=0.0, T=T, horizon=horizon)
+    assert bool(control.fault_of_step(t, 0.01)) is (status == DISCARD)
+    assert not replace(control, enabled=False).fault_of_step(t, 0.01)
     host = Host(folder)
     assert host.set({"tau0": 0.0, "T": T}) == host.set_string(host.reference["horizon"], horizon) == OK
     assert host.start(t) == OK

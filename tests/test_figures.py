@@ -46,6 +46,18 @@ def test_the_comparison_draws_the_controlled_car_in_red_whichever_run_it_is() ->
             np.testing.assert_allclose(blue.get_ydata(), 1e3 * run.trajectory[name])
 
 
+def test_beside_both_the_comparison_draws_the_other_design() -> None:
+    run, controlled, other = made_up_run(), made_up_run(enabled=True), made_up_run(enabled=True)
+    other.trajectory.values[:] *= 3.0
+    other.record["parameters"]["controller"]["design"] = "full-car"
+    subject = next(s for s in run_figures.subjects(run, controlled, other) if "09" in s.file)
+    assert "Purple: full-car design." in subject.caption()
+    for panel, name in zip(subject.panels, ("body.heave", "body.pitch", "body.roll"), strict=True):
+        *_, last = panel(Figure().subplots()).get_lines()
+        assert last.get_color() == figures.PURPLE
+        np.testing.assert_allclose(last.get_ydata(), 1e3 * other.trajectory[name])
+
+
 def test_the_same_data_give_the_same_bytes_whatever_style_the_user_has_set() -> None:
     subject = run_figures.subjects(made_up_run(), None)[4]
     before = dict(matplotlib.rcParams)

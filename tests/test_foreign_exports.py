@@ -39,9 +39,10 @@ def libcosim(system: Path, folder: Path) -> Path:
 
 def test_fmpys_command_line(dist: Path, tmp_path: Path) -> None:
     path = fmpy(dist, tmp_path, "enabled", "false")
+    assert main(["check", str(path), "--road-class", "curv:45"]) == 0
     assert check(path) == 0
     findings = json.loads((tmp_path / "fmpy.findings.json").read_text())
-    assert [f["holds"] for f in findings] == [True, True] and "row" in findings[0]["source"]
+    assert findings and all(f["holds"] and "fmpy.csv, row" in f["source"] for f in findings[:-1])
 
 
 def test_fmpys_command_line_with_another_car(dist: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -57,8 +58,12 @@ def test_a_controlled_run_is_not_judged_and_says_why(
     assert json.loads((tmp_path / "fmpy.findings.json").read_text()) == []
 
 
-def test_libcosims_log(system: Path, tmp_path: Path) -> None:
-    assert check(libcosim(with_parameters(system, tmp_path / "x.ssp", "x", PASSIVE), tmp_path)) == 0
+def test_libcosims_log(system: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """It has the heights that the car was given a step ago: no heights of its rows."""
+    path = libcosim(with_parameters(system, tmp_path / "x.ssp", "x", PASSIVE), tmp_path)
+    assert check(path) == 0
+    assert main(["check", str(path), "--road-class", "curv:45"]) == 2
+    assert "variable 'h_fl' is not in the trajectory" in capsys.readouterr().err
 
 
 def test_libcosims_log_names_its_car(system: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -21,6 +21,7 @@ from orders import observed_order
 
 from analysis.cosimulation import simulate
 from analysis.reference import closed_loop
+from analysis.ride import ride
 from analysis.scenario import read_scenario
 from fmu_src.controller.hardware import Forces, Hardware, Loop, Memory
 from fmu_src.controller.kalman import Filter, discretized, filter_for, sensor_matrices, steady_state
@@ -222,7 +223,9 @@ def test_all_together_in_the_loop_tend_to_the_direct_integration() -> None:
 
 def test_in_the_loop_forces_keep_their_limit_and_valves_take_energy_out() -> None:
     lqr = read_scenario("bump-lqr")
-    run = simulate(replace(lqr, stop_time=1.0, parameters={**lqr.parameters, **EVERYTHING})).trajectory
+    whole = simulate(replace(lqr, stop_time=1.0, parameters={**lqr.parameters, **EVERYTHING}))
+    run, ridden = whole.trajectory, ride(whole)
+    assert ridden.energy_spent < 1e-3 * ridden.energy_taken  # of struts that turn within a step; measured: 6.1e-4
     u, x = run.columns(FORCE_NAMES), run.columns(STATE_NAMES)
     rates = np.array([strut_rates(Car())(row[:7], row[7:]) for row in x.tolist()])
     assert np.abs(u).max() <= 60.0

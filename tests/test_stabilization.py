@@ -22,7 +22,9 @@ from analysis.errors import InputError
 from analysis.methods.linear_response import linear_response
 from analysis.methods.signals import Piece, Signal
 from analysis.stabilization import document, study
+from analysis.stabilization.certified import growth
 from analysis.stabilization.drawings import subjects
+from analysis.stabilization.full_car import car_plant, full_gain, varied_values
 from analysis.stabilization.half_car import (
     axle_road,
     come_down,
@@ -47,9 +49,11 @@ from analysis.stabilization.regulator import (
 )
 from analysis.stabilization.study import difference
 from analysis.trajectory import read_run, write_run
+from fmu_src.controller.fullcar import FullCar
 from fmu_src.controller.halfcar import HalfCar
 from fmu_src.controller.riccati import riccati_rate
 from fmu_src.road.profiles import RoadParameters
+from fmu_src.vehicle.parameters import Car
 
 Array = np.ndarray[Any, Any]
 Way = Callable[[Regulator, Array, Array], Arc]
@@ -279,6 +283,8 @@ def test_the_command_writes_table_json_and_figures(
     assert all(f["holds"] for f in data["findings"])
     proved = [[w[f"{d}-car design, car"]["certified"]["proved"] for w in data["weights"]] for d in ("half", "full")]
     assert proved == [[1.0, 0.0], [1.0, 1.0]]
+    own = [growth(car_plant(Car()), full_gain(FullCar(lam=w["lambda"])), varied_values(Car())) for w in data["weights"]]
+    assert [w["full-car design, car"]["growth"] for w in data["weights"]] == pytest.approx(own)
     figures = sorted(path.name for path in tmp_path.glob("*.svg"))
     assert figures == [f"stabilization-{n}.svg" for n in ("08-L14", "09-motion", "10-forces", "limit", "printed")]
     page = (tmp_path / document.PAGE).read_text(encoding="utf-8")

@@ -47,6 +47,15 @@ class ExactSystem:
         """w of the piece in which t lies."""
         return [inputs for begin, inputs in self.pieces if begin <= t][-1]
 
+    def inputs_over(self, begin: fmpq, end: fmpq) -> Inputs:
+        """w on all of begin ≤ t ≤ end. Raises NotProvedError if these are no interval, or lie across a corner of w."""
+        if not begin < end:
+            raise NotProvedError(f"a piece runs from t = {float(begin):g} s to {float(end):g} s")
+        for corner, _ in self.pieces:
+            if begin < corner < end:
+                raise NotProvedError(f"the piece from t = {float(begin):g} s on lies across a corner of the input")
+        return self.inputs_at(begin)
+
 
 @contextmanager
 def precision(terms: int) -> Iterator[None]:

@@ -136,7 +136,8 @@ def inputs(system: ExactSystem, metric: Metric, pieces: Sequence[Piece]) -> Arra
     found = []
     for p, count in zip(pieces, counts(pieces, metric), strict=True):
         steps = [arb(p.begin) + arb(p.duration) * (arb(k) + arb(0.5, 0.5)) / count for k in range(count)]
-        found += [[above(w) for w in system.inputs_at(p.begin)(t)] for t in steps]
+        over = system.inputs_over(p.begin, p.end)
+        found += [[above(w) for w in over(t)] for t in steps]
     return np.array(found)
 
 

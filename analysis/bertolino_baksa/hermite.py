@@ -49,10 +49,10 @@ def quintics(times: Array, x: Array, accelerations: Array) -> Quintics:
     return Quintics(half, np.concatenate([q, v], axis=1))
 
 
-def curvatures() -> Array:
-    """d²/du² (7, 6) at the nodes of the quintics with value, slope or curvature 1 (in u) at −1, then at 1."""
-    k = np.arange(2, 6)
-    return np.asarray((k * (k - 1) * NODES[:, None] ** (k - 2)) @ _FROM_ENDS[2:])
+def responses(order: int) -> Array:
+    """Derivatives (7, 6) in u at the nodes of the quintics with value, slope or curvature 1 (in u) at −1, then at 1."""
+    rows = [polynomial.polyval(NODES, polynomial.polyder(one, order)) for one in np.eye(6)]
+    return np.asarray(np.array(rows).T @ _FROM_ENDS)
 
 
 def _at_ends() -> Array:

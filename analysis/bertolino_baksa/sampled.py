@@ -3,7 +3,7 @@
 Between two rows x is near a quintic p. What p fails to obey, and what is open in the input, make a forcing f of x − p,
 which is known at both rows; so from the nearer one, in positive numbers,
 
-    |x − p| ≤ D,   D = e^(|A|h) open + ∫₀ʰ e^(|A|s) ds f,   h half a width, and f counts what D changes in R.
+    |x − p| ≤ D,   D = e^(|A|h) open + ∫₀ʰ e^(|A|s) ds |f|,   h half a width; f has what D may change in R.
 
 Thus e' = A e + R(x, w), e = 0 at the first row, has a forcing known from the rows: R(p, ŵ) but for what D and the open
 input change there. Errors do not add up from row to row, as they do for motions of which the first row alone is known.
@@ -17,13 +17,13 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg import expm
 
-from .balls import Array, ExactSystem, NotProvedError, matrix, rounded, two_norm
+from .balls import Array, ExactSystem, NotProvedError, matrix, rounded
 from .hermite import CHEBYSHEV, NODES, Quintics, quintics
+from .linear_flow import EPS, flow, grown, pairs, sizes_of
 from .majorant import SLACK, Majorant, majorant
 from .norms import Metric, Norm
 from .tube import input_matrix
 
-TERMS = 30  # of Taylor's series over a cell
 FINE = 16  # parts of a cell, for the norm of e
 ROOM = 1.5  # of the box on which the equations are bounded, over the largest motion and input
 ROUNDS = 6  # of widening D until it holds
@@ -31,7 +31,6 @@ RADIUS = 6.0  # in u, of the disc on which R(p, ŵ) is bounded: at its nodes' po
 OFF = 4.0 * (RADIUS + np.sqrt(RADIUS**2 - 1.0)) ** -6 / (RADIUS + np.sqrt(RADIUS**2 - 1.0) - 1.0)  # times the bound
 BOX = 1e-9  # of it, at least
 CONVERTED = 1e-10  # relative: what the values at the nodes lose as coefficients of τᵏ, with much to spare
-EPS = 1e-12  # relative, over the sum of the terms' sizes: the roundings of one step or value, with much to spare
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,7 +68,7 @@ class Between:
         back, rest = rounded(self.metric.inverse)
         e = self.error @ back.T
         x = self.linear @ back.T + e
-        off = (self.off + self.off_linear) @ _pairs(np.abs(back) + rest).T
+        off = (self.off + self.off_linear) @ pairs(np.abs(back) + rest).T
         return x, e, off + EPS * (np.abs(self.linear) + np.abs(self.error)) @ np.abs(back).T
 
     def largest_error(self, norm: Norm) -> float:
@@ -81,55 +80,85 @@ class Between:
         bends = np.abs(terms) @ (k * (k - 1)) / (8.0 * FINE**2)
         size = (lambda v: np.abs(v).max(axis=1)) if norm.largest else (lambda v: np.sqrt((v**2).sum(axis=1)))
         sizes = np.sqrt((np.abs(self.pieces).sum(axis=2) ** 2).sum(axis=1)) + self.off[1:].sum(axis=1)
-        top = size(values).max(axis=1) + size(bends) + _sizes(to, self.off[1:], norm)
+        top = size(values).max(axis=1) + size(bends) + sizes_of(to, self.off[1:], norm)
         return float((top + (rest + EPS * np.abs(to).sum()) * sizes).max())
 
 
-def _pairs(m: Array) -> Array:
-    """Sizes (…, n/2) of the pairs of entries (…, n)."""
-    return np.asarray(np.hypot(*np.split(m, 2, axis=-1)))
+def between(system: ExactSystem, metric: Metric, samples: Samples, tilted: int) -> Between:
+    """All motions that fit the rows. Raises NotProvedError if the rows leave too much open.
 
-
-def _sizes(to: Array, V: Array, norm: Norm) -> Array:
-    """Bounds (N,) of N(x) of all T x = to · y with y in V (N, n/2)."""
-    if norm.largest:
-        return np.asarray((V @ _pairs(to).T).max(axis=1))
-    columns = np.stack(np.split(to, 2, axis=1), axis=2).swapaxes(0, 1)  # (n/2, n, 2)
-    gram = two_norm(np.einsum("ikp,jkq->ijpq", columns, columns))
-    return np.asarray(np.sqrt(np.einsum("ci,ij,cj->c", V, gram, V)))
-
-
-def between(system: ExactSystem, metric: Metric, samples: Samples) -> Between:
-    """All motions that fit the rows. Raises NotProvedError if the rows leave too much open."""
+    tilted : a coordinate; the input enters as B w, but for the equation of this coordinate, where as cos q · B w.
+    """
     widths = np.diff(samples.times)
     B = rounded(input_matrix(system))[0]
-    R, forced = _forcing(system, metric, samples)
+    R, forced, jump = _forcing(system, metric, samples, tilted)
     held = np.stack([samples.inputs[:, 0], samples.inputs[:, 1] - samples.inputs[:, 0]], axis=2)
-    start = _pairs(np.abs(metric.S) @ (samples.open[0] + EPS * np.abs(samples.x[0])))
-    error, pieces, crumbs = _flow(metric, widths, R @ _TO_TAU, np.zeros(system.n))
-    linear, _, more = _flow(metric, widths, B @ held, metric.S @ samples.x[0])
-    off_linear = _grown(metric, widths, more, np.zeros_like(forced), start)
-    return Between(metric, linear, error, pieces, off_linear, _grown(metric, widths, crumbs, forced, 0.0 * start))
+    start = pairs(np.abs(metric.S) @ (samples.open[0] + EPS * np.abs(samples.x[0])))
+    error, pieces, crumbs = flow(metric, widths, R @ _TO_TAU, np.zeros(system.n))
+    linear, _, more = flow(metric, widths, B @ held, metric.S @ samples.x[0])
+    off_linear = grown(metric, widths, more, np.zeros_like(forced), start)
+    off = grown(metric, widths, crumbs, forced, jump[0]) + np.concatenate([jump[:1], jump])
+    return Between(metric, linear, error, pieces, off_linear, off)
 
 
-def _forcing(system: ExactSystem, metric: Metric, samples: Samples) -> tuple[Array, Array]:
-    """R(p, ŵ) (N − 1, n, 7) at the nodes of each cell, and how far (N − 1, n/2) S R(x, w) may be off it."""
-    AB = np.hstack([rounded(metric.A)[0], rounded(input_matrix(system))[0]])
-    most = np.concatenate([np.abs(samples.x).max(axis=0), np.abs(samples.inputs).max(axis=(0, 1))])
-    more = np.concatenate([samples.open.max(axis=0), samples.peak.max(axis=0)])
-    bound = majorant(system, ROOM * most + 2.0 * more + BOX)
+@dataclass(frozen=True, slots=True)
+class _Reference:
+    """Quintics p near the motion, on all cells; values at the nodes, and bounds over each cell."""
+
+    p: Quintics
+    y: Array  # (cells, n + m, 7), (p, ŵ)
+    X: Array  # (n + m, cells) ≥ |(p, ŵ)|
+    far: Array  # the same on the disc
+    R: Array  # (cells, n, 7), R(p, ŵ)
+    off: Array  # (cells, n), how far R(p, ŵ) may be off the polynomial with these values
+    defect: Array  # (cells, n, 7), p' − A p − B ŵ − R(p, ŵ)
+
+
+def _reference(bound: Majorant, AB: Array, samples: Samples) -> _Reference:
     p = _near(bound, AB, samples)
     middle, rise = samples.inputs.mean(axis=1), (samples.inputs[:, 1] - samples.inputs[:, 0]) / 2.0
     y = np.concatenate([p.values, middle[:, :, None] + rise[:, :, None] * NODES], axis=1)
     X, far = (np.hstack([p.size(r), np.abs(middle) + r * np.abs(rise)]).T for r in (1.0, RADIUS))
     R = _on_cells(bound.expansion, y)
     off = (OFF * bound(far) + CONVERTED * bound(X) + bound.tail(X, X)).T
-    sizes = (np.abs(AB) @ X).T + np.abs(p.coefficients) @ np.arange(6) / p.half[:, None]
-    wrong = np.abs((AB @ y + R - p.slopes) @ CHEBYSHEV.T).sum(axis=2) + off + EPS * sizes
-    pushed = wrong + samples.mean @ np.abs(AB[:, system.n :]).T
-    open_ = np.maximum(samples.open[:-1], samples.open[1:]) + EPS * p.size()
-    off += _change(bound, X, np.abs(AB[:, : system.n]), 2.0 * p.half, pushed, open_, samples.peak)
-    return R, _pairs(off @ np.abs(metric.S).T) * (1.0 + EPS)
+    return _Reference(p, y, X, far, R, off, p.slopes - AB @ y - R)
+
+
+def _forcing(system: ExactSystem, metric: Metric, samples: Samples, tilted: int) -> tuple[Array, Array, Array]:
+    """What moves e: R(p, ŵ) + Γ defect (cells, n, 7), how far off it S times that may be, and how far S e beside it.
+
+    The open input η moves e by Γ B η, Γ = cos q − 1, and x − p by B η. With B η from the equation of x − p this is Γ
+    times the defect, and the derivative of Γ (x − p), which is small: the mean of η in a cell shows in the rows.
+    """
+    n, AB, row = system.n, np.hstack([rounded(metric.A)[0], rounded(input_matrix(system))[0]]), system.n // 2 + tilted
+    most = np.concatenate([np.abs(samples.x).max(axis=0), np.abs(samples.inputs).max(axis=(0, 1))])
+    more = np.concatenate([samples.open.max(axis=0), samples.peak.max(axis=0)])
+    bound = majorant(system, ROOM * most + 2.0 * more + BOX)
+    r, A = _reference(bound, AB, samples), np.abs(AB[:, :n])
+    rounding = EPS * ((np.abs(AB) @ r.X).T + np.abs(r.p.coefficients) @ np.arange(6) / r.p.half[:, None])
+    wrong = np.abs(r.defect @ CHEBYSHEV.T).sum(axis=2) + r.off + rounding
+    D, by_x, by_all = _near_the_rows(bound, r, np.abs(AB), wrong, samples)
+    angle, turning = r.X[tilted] + D[:, tilted], r.X[row] + D[:, row]
+    gamma, moved = angle**2 / 2.0, angle**2 / 2.0 * D[:, row]
+    seen, missed = _product(-2.0 * np.sin(r.y[:, tilted] / 2.0) ** 2, np.cosh(r.far[tilted]) - 1.0, r.defect[:, row])
+    forcing, off = r.R.copy(), r.off + by_x + moved[:, None] * A[:, row]
+    forcing[:, row] += seen
+    off[:, row] += missed + gamma * (by_all[:, row] + (D @ A[row]) + (r.off + rounding)[:, row])
+    off[:, row] += angle * D[:, tilted] * wrong[:, row] + angle * turning * D[:, row]
+    off[:, row] += gamma * EPS * r.p.size()[:, row] / r.p.half  # p's own jumps at the rows, by rounding
+    S = np.abs(metric.S) * (1.0 + EPS)
+    return forcing, pairs(off @ S.T), pairs(moved[:, None] * S[:, row])
+
+
+def _product(gamma: Array, far: Array, defect: Array) -> tuple[Array, Array]:
+    """Values (cells, 7) of Γ · defect at the nodes, and how far (cells,) the polynomial with these values may be off.
+
+    gamma, defect : values at the nodes, the defect of degree 6; far (cells,) bounds Γ on the disc.
+    """
+    a, b = np.abs(gamma @ CHEBYSHEV.T), np.abs(defect @ CHEBYSHEV.T)
+    aliased = np.add.outer(np.arange(7), np.arange(7)) > 6  # degrees that fold back onto lower ones
+    missed = np.einsum("ck,kl,cl->c", a, aliased.astype(float), b)
+    return gamma * defect, missed + (OFF * far + CONVERTED * a.sum(axis=1)) * b.sum(axis=1)
 
 
 def _near(bound: Majorant, AB: Array, samples: Samples) -> Quintics:
@@ -147,93 +176,34 @@ def _on_cells(function: Callable[[Array], Array], y: Array) -> Array:
     return np.asarray(columns.reshape(-1, cells, k).swapaxes(0, 1))
 
 
-def _change(bound: Majorant, X: Array, A: Array, widths: Array, pushed: Array, open_: Array, inputs: Array) -> Array:
-    """Bound (cells, n) of |R(x, w) − R(p, ŵ)|. X (n + m, cells) bounds (p, ŵ), A = |A|.
+def _near_the_rows(
+    bound: Majorant, r: _Reference, AB: Array, wrong: Array, samples: Samples
+) -> tuple[Array, Array, Array]:
+    """Bounds (cells, n): D of |x − p|, and of |R(x, w) − R(p, ŵ)| for w = ŵ and for all w. AB = |(A, B)|."""
+    n = len(AB)
+    both = np.block([[AB[:, :n], np.eye(n)], [np.zeros((n, 2 * n))]]) * (1.0 + EPS)
+    distinct, where = np.unique(r.p.half, return_inverse=True)
+    over = np.array([expm(both * h)[:n] for h in distinct * (1.0 + EPS)])[where] * (1.0 + EPS)
+    known = np.maximum(samples.open[:-1], samples.open[1:]) + EPS * r.p.size()
+    pushed = wrong + samples.mean @ AB[:, n:].T
 
-    pushed, open_, inputs : bounds of the forcing of x − p without it, of x − p at both rows, and of w − ŵ.
-    """
-    n = len(A)
-    both = np.block([[A, np.eye(n)], [np.zeros((n, 2 * n))]]) * (1.0 + EPS)
-    distinct, where = np.unique(widths, return_inverse=True)
-    grown = np.array([expm(both * h)[:n] for h in distinct / 2.0 * (1.0 + EPS)])[where] * (1.0 + EPS)
-
-    def change(D: Array) -> Array:
+    def change(D: Array, inputs: Array) -> Array:
         Y = np.hstack([D, inputs]).T
         with np.errstate(over="ignore", invalid="ignore"):
-            return np.asarray((bound(X + Y) * (1.0 + SLACK) - bound(X) * (1.0 - SLACK) + bound.tail(X + Y, Y)).T)
+            return (bound(r.X + Y) - bound(r.X) + 2.0 * SLACK * bound(r.X + Y) + bound.tail(r.X + Y, Y)).T
 
-    def needed(more: Array) -> Array:
-        with np.errstate(over="ignore", invalid="ignore"):
-            return np.einsum("cij,cj->ci", grown, np.hstack([open_, pushed + more]))
-
-    D = 1.5 * needed(np.zeros_like(pushed))
+    D = np.zeros_like(pushed)
     for _ in range(ROUNDS):
-        enough = needed(change(D))
+        by_all = change(D, samples.peak)
+        enough = np.einsum("cij,cj->ci", over, np.hstack([known, pushed + by_all]))
+        if not np.all(np.isfinite(enough)):
+            break
         if np.all(enough <= D):
-            return change(enough)
-        D = 2.0 * enough
+            return D, change(D, 0.0 * samples.peak), by_all
+        D = 1.2 * enough
     raise NotProvedError(
         "between its rows the motion is not known well enough: they are too far apart, or of no motion"
     )
-
-
-def _flow(metric: Metric, widths: Array, forcing: Array, start: Array) -> tuple[Array, Array, Array]:
-    """y = S x under x' = A x + Σ f_k τᵏ: at the rows (N, n), its Taylor polynomials in τ, and their errors (N − 1,).
-
-    forcing : (N − 1, n, k).
-    """
-    A, rest = rounded(matrix(metric.S) * metric.A * metric.inverse)
-    f = metric.S @ forcing
-
-    def series(y: Array) -> Array:
-        terms = [y]
-        for k in range(TERMS):
-            slope = terms[-1] @ A.T + (f[:, :, k] if k < f.shape[2] else 0.0)
-            terms.append(slope * widths[:, None] / (k + 1))
-        return np.stack(terms, axis=2)
-
-    distinct, where = np.unique(widths, return_inverse=True)
-    over, driven = np.array([expm(A * w) for w in distinct]), series(np.zeros((len(widths), len(A)))).sum(axis=2)
-    rows = [start]
-    for k, extra in zip(where.tolist(), driven, strict=True):
-        rows.append(over[k] @ rows[-1] + extra)
-    pieces = series(np.array(rows[:-1]))
-    ratio = widths * (float(two_norm(A)) + rest) / (TERMS + 1)
-    if not ratio.max() < 0.5:
-        raise NotProvedError(f"rows {widths.max():g} s apart are too far apart")
-    sizes = np.abs(pieces).sum(axis=(1, 2)) + widths * (np.abs(metric.S) @ np.abs(forcing)).sum(axis=(1, 2))
-    last = np.sqrt((pieces[:, :, -1] ** 2).sum(axis=1))
-    return np.array(rows), pieces, 2.0 * last * ratio + (EPS + 2.0 * widths * rest) * sizes
-
-
-def _grown(metric: Metric, widths: Array, added: Array, forced: Array, start: Array) -> Array:
-    """V (N, n/2) from each row to the next one's, V' = C V + forced, and `added` (N − 1,) to each V in each cell."""
-    C = _comparison(metric)
-    size = len(C)
-    both = np.block([[C, np.eye(size)], [np.zeros((size, 2 * size))]])
-    rising = np.where(np.eye(size) > 0.0, np.maximum(C, 0.0), C)
-    distinct, where = np.unique(widths, return_inverse=True)
-    over = np.array([expm(both * w)[:size] for w in distinct]) * (1.0 + EPS)
-    within = np.array([expm(rising * w) for w in distinct]) * (1.0 + EPS)
-    V, found = start, [start]
-    for k, width, more, push in zip(where.tolist(), widths.tolist(), added.tolist(), forced, strict=True):
-        found.append(within[k] @ (V + width * push + more))
-        V = over[k] @ np.concatenate([V, push]) + more
-    return np.array(found)
-
-
-def _comparison(metric: Metric) -> Array:
-    """C (n/2, n/2) such that the pairs of S x under x' = A x + f grow at most as V' = C V + (sizes of the pairs of S f).
-
-    On its diagonal the largest eigenvalue of a pair's own symmetric part, beside it the sizes of the other blocks.
-    """
-    turned, rest = rounded(matrix(metric.S) * metric.A * metric.inverse)
-    half = len(turned) // 2
-    blocks = turned.reshape(2, half, 2, half)
-    C = np.sqrt((blocks**2).sum(axis=(0, 2)))
-    a, b, c, d = (np.diagonal(blocks[p, :, q, :]) for p in (0, 1) for q in (0, 1))
-    np.fill_diagonal(C, (a + d) / 2.0 + np.hypot((a - d) / 2.0, (b + c) / 2.0))
-    return C + rest + EPS * np.abs(C)
 
 
 _TO_TAU = np.linalg.inv(((1.0 + NODES) / 2.0)[None, :] ** np.arange(7)[:, None])  # values at the nodes → coefficients

@@ -14,6 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -81,7 +82,7 @@ def prove_tube(
 ) -> Tube:
     """The tube around the pieces for motions x_lin and x that begin within `off` [‖·‖_S] of start[0] and of the sum.
 
-    Raises NotProvedError where the pieces leave a gap or the tube cannot be closed.
+    Raises NotProvedError where the pieces leave a gap or lie across a corner of w, or the tube cannot be closed.
     """
     B = input_matrix(system)
     defects = [(_linear_defect(system, metric, B, p), _defect(system, metric, p)) for p in pieces]
@@ -95,9 +96,8 @@ def followed(
     V_lin, V, V_e = off
     before = start[0][:, None], start[1][:, None]
     widths, rates = [], []
-    for k, (piece, (d_lin, d)) in enumerate(zip(pieces, defects.tolist(), strict=True)):
-        if k and piece.begin != pieces[k - 1].end:
-            raise NotProvedError(f"pieces {k - 1} and {k} do not follow each other")
+    _refuse_gaps(pieces)
+    for piece, (d_lin, d) in zip(pieces, defects.tolist(), strict=True):
         V_lin, V, V_e = (v + jump for v, jump in zip((V_lin, V, V_e), jumps(metric, before, piece), strict=True))
         after, L = _closed(system, metric, piece, V, d)
         after_lin, full = _grown(V_lin, -metric.alpha, d_lin, piece), max(V, after)
@@ -111,15 +111,22 @@ def followed(
 
 
 def prove_linear(system: ExactSystem, metric: Metric, pieces: Sequence[Piece]) -> Array:
-    """V (pieces,) of x_lin alone, from x_lin(0) = the first piece's begin on."""
+    """V (pieces,) of x_lin alone, from x_lin(0) = the first piece's begin on. Raises NotProvedError for a gap."""
     B, V, before = input_matrix(system), 0.0, (pieces[0].linear[:, :1], pieces[0].error[:, :1])
     found = []
+    _refuse_gaps(pieces)
     for piece in pieces:
         V += jumps(metric, before, piece)[0]
         after = _grown(V, -metric.alpha, _linear_defect(system, metric, B, piece), piece)
         found.append(max(V, after))
         V, before = after, (piece.linear, piece.error)
     return np.array(found)
+
+
+def _refuse_gaps(pieces: Sequence[Piece]) -> None:
+    for k, (piece, following) in enumerate(pairwise(pieces)):
+        if piece.end != following.begin:
+            raise NotProvedError(f"pieces {k} and {k + 1} do not follow each other")
 
 
 def input_matrix(system: ExactSystem) -> arb_mat:
@@ -164,7 +171,7 @@ def _centred(p: Sequence[Balls], centre: Any, terms: int) -> list[list[Any]]:
 def _inputs(system: ExactSystem, piece: Piece, centre: Any, terms: int) -> list[list[Any]]:
     """So many coefficients of w by powers of σ = 2 (τ − centre), the centre a ball in 0 ≤ τ ≤ 1."""
     h = arb(piece.duration)
-    w = system.inputs_at(piece.begin)(arb_series([arb(piece.begin) + h * centre, h / 2], prec=terms))
+    w = system.inputs_over(piece.begin, piece.end)(arb_series([arb(piece.begin) + h * centre, h / 2], prec=terms))
     return [coefficients(wi, terms) for wi in w]
 
 
@@ -232,7 +239,7 @@ def _sup_length(metric: Metric, entries: Sequence[Any], terms: int) -> float:
 def _closed(system: ExactSystem, metric: Metric, piece: Piece, V: float, defect: float) -> tuple[float, float]:
     """V at the end, and the L that holds on a tube wide enough for V to stay in it."""
     ranges = [arb_poly(c)(arb(0, 1)) for c in _centred(both(piece), MIDDLE, 0)]
-    w = system.inputs_at(piece.begin)(arb(piece.begin) + arb(piece.duration) * WHOLE)
+    w = system.inputs_over(piece.begin, piece.end)(arb(piece.begin) + arb(piece.duration) * WHOLE)
     most = 2.0 * (V + defect * above(arb(piece.duration)))
     for _ in range(TRIES):
         box = [r + arb(0, n * most) for r, n in zip(ranges, metric.reach.tolist(), strict=True)]

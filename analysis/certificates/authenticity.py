@@ -17,9 +17,11 @@ from fmu_src.road.profiles import SNAP
 from fmu_src.vehicle.equations import equations_of_motion
 from fmu_src.vehicle.parameters import Car
 
-from ..bertolino_baksa.hermite import NODES, curvatures, quintics
+from ..bertolino_baksa.balls import NotProvedError
+from ..bertolino_baksa.hermite import NODES, quintics, responses
 from ..bertolino_baksa.sampled import Samples
 from ..car import car_form
+from ..discrepancy import scales
 from ..methods.polynomials import Array
 from ..methods.signals import Signal
 
@@ -40,7 +42,9 @@ class KnownRoad:
 
 
 def profile(signal: Signal, corners: Sequence[float], times: Array) -> KnownRoad:
-    """A road that is known exactly, its corners too [s]."""
+    """A road that is known exactly, its corners too [s]. Raises NotProvedError for times before the signal's."""
+    if times[0] < signal.begin:
+        raise NotProvedError(f"the export begins at {times[0]:g} s, before the road is known")
     steps, cells = np.diff(times), len(times) - 1
     inside = times[:-1, None] + steps[:, None] * np.array([INSIDE, 1.0 - INSIDE])
     nodes = times[:-1, None] + steps[:, None] * (1.0 + NODES) / 2.0
@@ -70,17 +74,34 @@ class Defect:
     out: int  # number of cells that are out of what is allowed
 
 
-def defect(car: Car, road: KnownRoad, times: Array, x: Array, digits: Array, own: float) -> Defect:
-    """The defect along the quintics of rows x (N, 14) at times (N,) [s].
+@dataclass(frozen=True, slots=True)
+class Export:
+    """Rows (N,) that are judged, and how good they are."""
 
-    digits : of the rows (N, 14).  own : what the run may deviate from a motion, over each state's maximum.
-    """
+    times: Array  # [s]
+    x: Array  # (N, 14)
+    digits: Array  # (N, 14), what the printed digits leave open
+    accelerations: Array | None  # (N, 7), where they are exported too,
+    their_digits: Array | None  # (N, 7)
+    own: float  # what the run may deviate from a motion, over each state's maximum
+
+
+def defect(car: Car, road: KnownRoad, export: Export) -> Defect:
+    """The defect along the quintics, and that of the exported accelerations at each cell's end."""
+    x = export.x
     ends = np.stack([x[:-1], x[1:]], axis=2)
     rates = _accelerations(car, ends, road.ends.swapaxes(1, 2))
-    found = quintics(times, x, rates.swapaxes(1, 2))
+    found = quintics(export.times, x, rates.swapaxes(1, 2))
     sizes = np.abs(_accelerations(car, found.values, road.nodes) - found.slopes[:, 7:]).max(axis=2)
-    allowed = MISSED * _fourth_differences(rates[:, :, 0]) + GROWS * own * np.abs(rates).max(axis=(0, 2))
-    allowed += _digits(car, found.half, digits) + _open(car, found.half, road)
+    allowed = MISSED * _fourth_differences(rates[:, :, 0]) + GROWS * export.own * scales(rates[:, :, 0])
+    allowed += _digits(car, found.half, export.digits) + _open(car, road)
+    if export.accelerations is not None and export.their_digits is not None:
+        after = np.concatenate(
+            [rates[1:, :, 0], rates[-1:, :, 1]]
+        )  # at a corner of the road they may be of either side
+        wrong = [np.abs(export.accelerations[1:] - side) for side in (rates[:, :, 1], after)]
+        sizes = np.maximum(sizes, np.min(wrong, axis=0))
+        allowed += export.their_digits[1:]
     ratio = np.where(road.smooth[:, None], sizes / allowed, 0.0)
     cell, coordinate = (int(i) for i in np.unravel_index(np.argmax(ratio), ratio.shape))
     out = int(np.count_nonzero(~(ratio <= 1.0).all(axis=1)))
@@ -104,15 +125,18 @@ def _fourth_differences(rates: Array) -> Array:
 
 def _digits(car: Car, half: Array, digits: Array) -> Array:
     """What the rows' digits may do to the defect (cells, 7)."""
-    A = np.abs(car_form(car, order=1).A[7:])
-    most = np.maximum(digits[:-1], digits[1:])
-    at_q, at_v, at_a = np.abs(curvatures()).max(axis=0).reshape(2, 3).sum(axis=0)
-    h = half[:, None]
-    return np.asarray(at_q * most[:, :7] / h**2 + at_v * most[:, 7:] / h + (1.0 + at_a) * (most @ A.T))
+    A, most, h = np.abs(car_form(car, order=1).A[7:]), np.maximum(digits[:-1], digits[1:]), half[:, None]
+    at_rows = np.stack([most[:, :7], h * most[:, 7:], h**2 * (most @ A.T)])
+    q, v, a = (
+        np.tensordot(np.abs(responses(order)).max(axis=0).reshape(2, 3).sum(axis=0), at_rows, 1) / h**order
+        for order in range(3)
+    )
+    return np.asarray(a + np.hstack([q, v]) @ A.T)
 
 
-def _open(car: Car, half: Array, road: KnownRoad) -> Array:
+def _open(car: Car, road: KnownRoad) -> Array:
     """What the open road may do to the defect (cells, 7): it moves the car from the first row to the second."""
     B = np.abs(car_form(car, order=1).B[7:])
-    at_q, at_v, _ = np.abs(curvatures()).max(axis=0)[3:]
-    return np.asarray(road.peak @ B.T + (2.0 * at_q + 2.0 * at_v) * (road.mean @ B.T))
+    at_q, at_v, _ = np.abs(responses(2)).max(axis=0)[3:]
+    # over a width 2h by at most mean · 2h in velocity and mean · 2h² in position, here in u
+    return np.asarray(road.peak @ B.T + 2.0 * (at_q + at_v) * (road.mean @ B.T))

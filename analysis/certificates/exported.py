@@ -29,6 +29,7 @@ from ..trajectory import Run, Trajectory, parsed
 SAMPLING, BY_DEFAULT = "road_sampling", "start"  # as the FMU has it, and with it most masters
 GAP = 1.5  # times the median step; more between two rows is a gap
 PRINTED = (5e-6, 5e-7)  # relative and absolute: six digits or six decimals of a parameter, fewer than any tool prints
+LOGGED = "StepCount"  # a column of every log of libcosim's, which holds all variables of one FMU, also its inputs
 TYPES = ("REAL", "INT", "BOOL", "STR")  # that Ecos prints where others print units
 _NAME = re.compile(
     r"\s*(?:(?P<owner>vehicle|road|controller|vehicle7dof|roadexcitation|lqrcontroller)(?:\.|::))?"
@@ -56,7 +57,10 @@ def read_export(path: Path, scenario: Scenario) -> tuple[Run, dict[str, Array]]:
             rows = list(csv.reader(file))
     except (OSError, UnicodeDecodeError, csv.Error) as error:
         raise InputError(f"{path}: cannot be read: {error}") from error
-    names = [_name(cell, path) for cell in (rows[0] if rows else [])]
+    header = rows[0] if rows else []
+    names = [_name(cell, path) for cell in header]
+    if LOGGED in header:  # the car's log, in which the road is what was passed on a step ago
+        names = ["" if name in {q.name for q in ROAD} else name for name in names]
     if missing := [name for name in ("time", *(q.name for q in STATES)) if name not in names]:
         raise InputError(f"{path}: row 1: wanted time and all 14 states, but {', '.join(missing)} are missing")
     where = [names.index("time"), *(i for i, name in enumerate(names) if name and name != "time")]

@@ -23,6 +23,7 @@ from ..errors import InputError
 from .falsification import Rows, judged
 
 TURN = 0.1  # rad that the fastest mode turns over a step of ∫|e^(At) B| dt
+TILTED = 6  # ψ2: heights enter (3.2)–(3.4) linearly, and (3.7) times cos ψ2
 SLACK = 1.0 + 1e-9  # for the roundings of times and heights
 
 
@@ -99,7 +100,9 @@ class AllRoads:
 def on_all_roads(system: ExactSystem, metric: Metric, rows: Samples) -> AllRoads:
     """Raises NotProvedError if the rows leave too much open."""
     since = rows.times - rows.times[0]
-    return AllRoads(between(system, metric, rows), _spread(metric, input_matrix(system), since, rows.peak.max(axis=0)))
+    return AllRoads(
+        between(system, metric, rows, TILTED), _spread(metric, input_matrix(system), since, rows.peak.max(axis=0))
+    )
 
 
 def _spread(metric: Metric, B: arb_mat, times: Array, peak: Array) -> Array:

@@ -4,7 +4,8 @@ A sample is taken at the first communication point at or after each multiple of 
 point without one) and its forces are held until the next. Per sample: sensors and filter, if there are any, make the
 states that the law sees; the forces are cut to the limit. The actuators follow with a lag; those that are semi-active
 are dampers with a valve: they give a force only while it takes energy out of the strut, u Δ̇ ≤ 0, and no more of it than
-with the valve shut, |u| ≤ b_max |Δ̇|. (Without that bound the force would hold a strut still as dry friction does.)
+with the valve shut, |u| ≤ b_max |Δ̇|. (Without that bound the force would hold a strut still as dry friction does.) That
+is so at communication points: under a force that a master holds over its step a strut may turn, and gets a little.
 """
 
 from __future__ import annotations
