@@ -10,7 +10,8 @@ import pytest
 
 from analysis.bertolino_baksa.adversary import excursions
 from analysis.bertolino_baksa.balls import NotProvedError
-from analysis.bertolino_baksa.certificate import from_json, to_json, verify
+from analysis.bertolino_baksa.certificate import Certificate, Claim, from_json, to_json, verify
+from analysis.bertolino_baksa.norms import Norm
 from analysis.car import car_form, road_signal
 from analysis.certificates.car_certificates import build
 from analysis.certificates.closed_loop_certificate import both, comparison, infinite_gain
@@ -57,3 +58,16 @@ def test_control_is_certified_in_the_passive_norms() -> None:
 def test_a_loop_with_hardware_is_refused_by_name(option: dict[str, Any]) -> None:
     with pytest.raises(InputError, match=f"no hardware, got {next(iter(option))} = "):
         infinite_gain(option)
+
+
+def test_deltas_are_compared_where_they_are_proved_and_not_between() -> None:
+    """By the table's steps; where one of the two claims nothing, at an ε below its floor, nothing is compared."""
+
+    def made(rows: list[list[float]]) -> Certificate:
+        claim = Claim(Norm("energy", np.eye(14)), np.array(rows))
+        return Certificate({}, np.zeros(14), np.eye(14), (), (claim,))
+
+    before, after = made([[0.05, 1.0], [0.4, 2.0], [1.0, 8.0]]), made([[0.04, 3.0], [0.6, 4.0], [1.0, 9.0]])
+    assert comparison(before, after) == [
+        "  energy norm: l times 0.8; largest delta times 1.12; delta times 3 at eps = 0.1, 1.5 at eps = 0.5"
+    ]

@@ -20,6 +20,8 @@ from ..errors import InputError
 from ..files import write_whole
 from ..reference import Parameters, car_of
 from .car_certificates import build, metric_of, model_of
+from .certificate_words import model_words, named_by_content, refuse_exceeded
+from .directed import at_least, at_most
 from .exact_car import norms
 
 
@@ -66,7 +68,7 @@ def command(parameters: Parameters, A: float, V: float | None, where: Path | Non
             for line in statement(certificate, driven):
                 print(line, flush=True)
             top = largest(lambda A: found.under(heights(parameters, A, V)).motion(np.zeros(14)), A)
-            print(f"  proved up to A = {top:.4g} m")
+            print(f"  proved up to A = {at_least(top)} m")
     except NotProvedError as error:
         print(f"no certificate: {error}")
         return 1
@@ -77,22 +79,32 @@ def command(parameters: Parameters, A: float, V: float | None, where: Path | Non
 
 
 def statement(certificate: BoundedCertificate, driven: Driven) -> list[str]:
-    """What is proved, each number beside what a road of the class reaches from rest."""
-    bounds, form = certificate.bounds, car_form(car_of(certificate.model["parameters"]))
-    slope = f" and |dh/dt| <= {bounds.sizes[4]:g} m/s that begins at 0" if bounds.tied else ""
+    """What is proved, each number beside what a road of the class reaches from rest.
+
+    Raises NotProvedError if that exceeds it, or where the bounds of the inputs are not those of a class of roads.
+    """
+    parameters, bounds = certificate.model["parameters"], certificate.bounds
+    A, V = float(bounds.sizes[0]), float(bounds.sizes[4])
+    if "gain" in certificate.model or not np.array_equal(
+        heights(parameters, A, V if bounds.tied else None).sizes, bounds.sizes
+    ):
+        raise NotProvedError("wanted the car without control and the same bounds under each wheel")
+    form = car_form(car_of(parameters))
+    slope = f" and |dh/dt| <= {V!r} m/s that begins at 0" if bounds.tied else ""
     with precision(2):
         states, _ = driven.motion(np.zeros(14))
-    named = ", ".join(f"{q.name} {y:.3g} {q.unit}" for q, y in zip(STATES[:7], states[:7].tolist(), strict=True))
+    named = ", ".join(f"{q.name} {at_most(y, 3)} {q.unit}" for q, y in zip(STATES[:7], states.tolist(), strict=False))
     lines = [
-        f"psi = 0 is almost stable (definition 2.1) under every road with |h| <= {bounds.sizes[0]:g} m{slope}, "
-        "whatever its course:",
+        f"psi = 0 is almost stable (definition 2.1) under every road with |h| <= {A!r} m{slope}, whatever its course:",
         f"  from rest: {named}",
     ]
-    for claim in certificate.claims:
+    for claim in named_by_content(certificate.claims, norms(car_of(parameters), driven.states[:, None])):
         most = reached(form, claim.norm, bounds, worst_inputs(form, claim.norm, bounds))
-        table = ", ".join(f"{e:.4g} for {d:.4g}" for e, d in claim.table[1:].tolist())
+        refuse_exceeded(claim, most)
+        table = ", ".join(f"{at_most(e)} for {at_least(d)}" for e, d in claim.table[1:].tolist())
         lines.append(
-            f"  {claim.norm.name} norm: l = {claim.floor:.4g} (a worst road reaches {most:.4g}: "
-            f"ratio {claim.floor / most:.3g}); eps for delta: {table}"
+            f"  {claim.norm.name} norm: l <= {at_most(claim.floor)}, which is eps for delta = "
+            f"{at_least(claim.table[0, 1])} (a worst road reaches {most:.4g} from rest: "
+            f"ratio {claim.floor / most:.3g}); eps for larger delta: {table}"
         )
-    return lines
+    return [*lines, *model_words(certificate.model)]

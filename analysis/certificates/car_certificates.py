@@ -21,8 +21,9 @@ from ..bertolino_baksa.certificate import Certificate, certify
 from ..bertolino_baksa.norms import Norm, modal_metric, proved_metric
 from ..bertolino_baksa.proof import Proof, prove
 from ..bertolino_baksa.taylor import find_pieces
-from ..car import car_form
+from ..car import car_form, road_signal
 from ..errors import InputError
+from ..methods.linear_response import linear_response
 from ..methods.polynomials import Array
 from ..reference import Parameters, car_of, road_parameters
 from .exact_car import energy_norm, exact_system, norms
@@ -42,6 +43,7 @@ OTHERS = {
     "h_max",
 }
 WORDS = {float: "number with a decimal point", str: "word", bool: "truth value, true or false"}
+POINTS = 4000  # of x_lin, for the weights of its norm
 ROUND_OFF = 1e-9  # of the largest eigenvalue: a decay below it is not told from none
 
 
@@ -85,27 +87,26 @@ def _checked(model: dict[str, Any]) -> tuple[Parameters, Array | None]:
     return parameters, gain
 
 
-def certify_car(
-    parameters: Mapping[str, Any], gain: Array | None = None, named: tuple[Norm, ...] = ()
-) -> tuple[Certificate, Proof]:
-    """The certificate of x_lin from rest for these parameters of car and road, in the norms `named` or in its own.
+def certify_car(parameters: Mapping[str, Any], gain: Array | None = None) -> tuple[Certificate, Proof]:
+    """The certificate of x_lin from rest for these parameters of car and road, in the norms `car_norms`.
 
     Raises NotProvedError, with the reason, if there is none; InputError for parameters that cannot be.
     """
-    model, car, S, ends = _prepared(parameters, gain)
-    return certify(model, build, S, lambda x_lin: named or norms(car, x_lin), ends, np.zeros(14))
+    model, S, ends = _prepared(parameters, gain)
+    named = car_norms(parameters)
+    return certify(model, build, S, lambda _: named, ends, np.zeros(14))
 
 
 def prove_reference(parameters: Mapping[str, Any], gain: Array | None = None) -> Proof:
     """The proof behind a certificate, without its table of δ(ε)."""
-    model, _, S, ends = _prepared(parameters, gain)
+    model, S, ends = _prepared(parameters, gain)
     with precision(2):
         system = build(model)
         return prove(system, proved_metric(system, S), find_pieces(system, [0.0] * 14, ends[0]), [0.0] * 14)
 
 
-def _prepared(parameters: Mapping[str, Any], gain: Array | None) -> tuple[dict[str, Any], Car, Array, list[fmpq]]:
-    """Model, car, metric, and the times at which the pieces may end."""
+def _prepared(parameters: Mapping[str, Any], gain: Array | None) -> tuple[dict[str, Any], Array, list[fmpq]]:
+    """Model, metric, and the times at which the pieces may end."""
     model = model_of(parameters, gain)
     try:
         with precision(2):
@@ -114,7 +115,23 @@ def _prepared(parameters: Mapping[str, Any], gain: Array | None) -> tuple[dict[s
         raise InputError(f"the parameters of car and road: {error}") from error
     car = car_of(dict(parameters))
     A = car_form(car, gain=gain, order=1).A
-    return model, car, metric_of(car, gain), stops(system, A)
+    return model, metric_of(car, gain), stops(system, A)
+
+
+def car_norms(parameters: Mapping[str, Any]) -> tuple[Norm, ...]:
+    """The norms of a statement on this car and road: by x_lin from rest, without control. Raises as `stops`."""
+    model = model_of(parameters)
+    with precision(2):
+        system = build(model)
+    car = car_of(model["parameters"])
+    end = float(stops(system, car_form(car, order=1).A)[0])
+    return norms(car, linear_motion(model["parameters"], np.linspace(0.0, end, POINTS)).T)
+
+
+def linear_motion(parameters: Parameters, times: Array) -> Array:
+    """x_lin (n, 14) from rest at t = 0, at times (n,) [s] from 0 on."""
+    form = car_form(car_of(parameters), order=1)
+    return linear_response(form.A, form.B, np.zeros(14), road_signal(road_parameters(parameters)), times).T
 
 
 def metric_of(car: Car, gain: Array | None = None) -> Array:

@@ -22,32 +22,42 @@ from ..bertolino_baksa.certificate import Certificate, certificate_of, opened, t
 from ..bertolino_baksa.norms import proved_metric
 from ..bertolino_baksa.proof import Proof
 from ..bertolino_baksa.quick import quick_floors
+from ..bertolino_baksa.tube import Tube
 from ..car import car_form, road_signal
 from ..files import write_whole
-from ..methods.linear_response import linear_response
+from ..methods.polynomials import Array
 from ..reference import Parameters, car_of, road_parameters
 from ..tyres import static_loads_of
 from .car_bounded_roads import statement as every_road
-from .car_certificates import build, certify_car, metric_of, model_of, prove_reference, stops
+from .car_certificates import build, car_norms, certify_car, metric_of, model_of, prove_reference, stops
 from .certificate_figures import adversary_points, draw_delta
-from .exact_car import exact_car, norms
+from .certificate_words import model_words, named_by_content, refuse_exceeded, start_words
+from .directed import at_least, at_most
+from .exact_car import exact_car
 
 CLOSE = 1.02  # ratio at which the bisection for the largest amplitude stops
 TINY = 1e-6  # m; below it the search for an amplitude is given up
 
 
 def make_certificate(parameters: Parameters, where: Path | None, *, largest: bool = False) -> int:
-    """Certify x_lin from rest, print what is proved, write the file; 0, or 1 if there is no certificate."""
+    """Certify x_lin from rest, print what is proved, write the file; 0, or 1 if there is no certificate.
+
+    It is of the car without control: a controller of these parameters is left out, and that is said.
+    """
+    if parameters.get("enabled", False):
+        print("The car is certified without its controller; with it: --closed-loop.", file=sys.stderr)
     print("Finding and proving a reference motion ...", file=sys.stderr, flush=True)
     try:
         certificate, proof = certify_car(parameters)
+        lines = statement(certificate, proof)
     except NotProvedError as error:
         print(f"no certificate: {error}")
         return 1
-    for line in statement(certificate, proof):
+    for line in lines:
         print(line)
     if largest:
-        print(f"  the largest A with a proved tube: {largest_amplitude(parameters):.4g} m (by bisection, to {CLOSE:g})")
+        A = at_least(largest_amplitude(parameters))
+        print(f"  the largest A with a proved tube: {A} m (by bisection, to {CLOSE:g})")
     if where is not None:
         write_whole(where, to_json(certificate))
         print(f"{where}: written")
@@ -86,57 +96,75 @@ def quick_answer(parameters: Parameters) -> int:
         with precision(2):
             system = build(model_of(parameters))
             end = stops(system, form.A)[0]
-            x_lin = linear_response(form.A, form.B, np.zeros(14), signal, np.linspace(0.0, float(end), 2000))
-            named = norms(car, x_lin)
+            named = car_norms(parameters)
             floors = quick_floors(system, proved_metric(system, metric_of(car)), named, [0.0] * 14, end)
     except NotProvedError as error:
         print(f"no quick answer: {error}")
         return 1
     true = reference_floor(form, signal, named, np.zeros(14), float(end))
     for norm, floor, least in zip(named, floors, true, strict=True):
-        print(f"l <= {floor:.4g} in the {norm.name} norm ({floor / least:.2g} times what a reference motion reaches)")
+        coarse = f"{floor / least:.2g} times what a reference motion reaches"
+        print(f"l <= {at_most(floor)} in the {norm.name} norm ({coarse})")
     return 0
 
 
 def statement(certificate: Certificate, proof: Proof) -> list[str]:
-    """What is proved, line by line, each certified number beside an empirical one."""
-    parameters = certificate.model["parameters"]
-    gain = certificate.model.get("gain")
-    form = car_form(car_of(parameters), gain=None if gain is None else np.array(gain))
-    signal, end = road_signal(road_parameters(parameters)), float(certificate.pieces[-1].end)
-    true = reference_floor(form, signal, [c.norm for c in certificate.claims], certificate.x0, end)
-    lines = ["x_lin is almost stable (definition 2.1): for all t >= 0 and every eps >= l,"]
-    for claim, floor in zip(certificate.claims, true.tolist(), strict=True):
+    """What is proved, line by line, each certified number beside an empirical one.
+
+    Raises NotProvedError if that exceeds it: no proof says so, but a fault in one would.
+    """
+    model = certificate.model
+    claims = named_by_content(certificate.claims, car_norms(model["parameters"]))
+    form = car_form(car_of(model["parameters"]), gain=np.array(model["gain"]) if "gain" in model else None)
+    signal, end = road_signal(road_parameters(model["parameters"])), float(certificate.pieces[-1].end)
+    true = reference_floor(form, signal, [c.norm for c in claims], certificate.x0, end)
+    start = start_words(certificate.x0)
+    lines = [f"x_lin {start} is almost stable (definition 2.1): for all t >= 0 and every eps >= l,"]
+    for claim, floor in zip(claims, true.tolist(), strict=True):
         epsilon, delta = claim.table[-1].tolist()
-        ratio = f": ratio {claim.floor / floor:.4f}" if floor > 0.0 else ""
+        refuse_exceeded(claim, floor)
+        beside = f"a reference motion reaches {floor:.6g}" + (f": ratio {claim.floor / floor:.4f}" if floor else "")
         lines.append(
-            f"  {claim.norm.name} norm: l = {claim.floor:.6g} (a reference motion reaches {floor:.6g}{ratio}); "
-            f"delta up to {delta:.4g}, at eps = {epsilon:.4g}"
+            f"  {claim.norm.name} norm: l <= {at_most(claim.floor, 6)} ({beside}); "
+            f"delta up to {at_least(delta)}, at eps = {at_most(epsilon)}"
         )
     ends = "x -> 0 after the road's end" if proof.repetition is None else "every period's tube returns into itself"
-    return [*lines, f"  {ends}", *_tubes(proof), *_tyres(parameters, proof)]
+    return [*lines, *model_words(model), f"  {ends}", *_along(model["parameters"], proof, start)]
 
 
-def _tubes(proof: Proof) -> list[str]:
-    bounds = errors_of_states(proof.tube, proof.metric)
-    named = ", ".join(f"{q.name} {b:.3g} {q.unit}" for q, b in zip(STATES[:7], bounds[:7].tolist(), strict=True))
-    return [f"  |x - x_lin| of the motion from rest: {named}"]
+def _along(parameters: Parameters, proof: Proof, start: str) -> list[str]:
+    """Of the motion from x0 alone, for how long: |x − x_lin|, and whether the springs of its tyres only push.
+
+    With its later periods where the road repeats itself; the tail of a road that ends is left out.
+    """
+    tubes = [proof.tube, *([proof.repetition.window] if proof.repetition else [])]
+    until = "for all t >= 0" if proof.repetition else f"until t = {float(proof.tube.pieces[-1].end):g} s"
+    bounds = np.max([errors_of_states(tube, proof.metric) for tube in tubes], axis=0)
+    named = ", ".join(f"{q.name} {at_most(b, 3)} {q.unit}" for q, b in zip(STATES[:7], bounds.tolist(), strict=False))
+    low = np.min([_loads(parameters, proof, tube) for tube in tubes], axis=0)
+    worst = int(np.argmin(low))
+    load = f"each tyre's load is at least {at_least(low[worst])} N ({CORNER_WORDS[worst]})"
+    contact = (
+        "so that it stays on the ground; of other starts within delta this is not said"
+        if low[worst] > 0.0
+        else "so that contact is not proved: where a load is negative the certificate speaks of springs that pull"
+    )
+    return [
+        f"  of the motion {start} itself, {until}:",
+        f"    |x - x_lin| at most {named}",
+        f"    {load}, {contact}",
+    ]
 
 
-def _tyres(parameters: Parameters, proof: Proof) -> list[str]:
-    """Smallest load of each tyre along the motion from x0, and whether the springs only push."""
+def _loads(parameters: Parameters, proof: Proof, tube: Tube) -> Array:
+    """Smallest loads (4,) [N] of the tyres in a tube."""
     motion = equations_of_motion(exact_car(car_of(parameters)), lambda x: x.sin(), lambda x: x.cos())
 
     def forces(x: Sequence[object], w: Sequence[object], sin: object, cos: object) -> Sequence[object]:
         return motion(x[:7], x[7:], [0.0] * 4, w[:4], w[4:])[2]
 
     with precision(2):
-        low = outputs(proof.system, proof.tube, proof.metric, forces)[0] + static_loads_of(car_of(parameters))
-    worst = int(np.argmin(low))
-    said = f"  smallest tyre load on the pieces: {low[worst]:.4g} N ({CORNER_WORDS[worst]})"
-    if low[worst] > 0.0:
-        return [f"{said}; every tyre stays on the ground"]
-    return [f"{said}; contact is not proved: where a load is negative the certificate speaks of springs that pull"]
+        return outputs(proof.system, tube, proof.metric, forces)[0] + static_loads_of(car_of(parameters))
 
 
 def largest_amplitude(parameters: Parameters) -> float:

@@ -16,11 +16,12 @@ from ..bertolino_baksa.funnel import ends, funnel
 from ..bertolino_baksa.proof import Proof
 from ..car import car_form, road_signal
 from ..figures import BLUE, DASHED, ORANGE, READING, RED, Axes, Subject, axis_label, finish, readable, render, words
-from ..methods.linear_response import linear_response
 from ..methods.polynomials import Array
-from ..reference import Parameters, car_of, road_parameters
+from ..reference import car_of, road_parameters
 from ..run_figures import DELTA, TUBE
 from ..trajectory import Run
+from .car_certificates import linear_motion
+from .directed import at_least, at_most
 
 UNITS = {"energy": "√J", "weighted sup": "–", "Euclid": "SI"}
 POINTS = 5  # of an adversary, spread over the table of δ(ε)
@@ -89,8 +90,9 @@ def _delta_caption(points: Sequence[Points]) -> str:
         near = each.ratio[each.rows[:, 1] <= each.claim.largest_delta / 3.0].max(initial=1.0)
         floor = f" = {readable(each.claim.floor / each.floor, 5)} times what is reached" if each.floor > 0.0 else ""
         said.append(
-            f"{each.claim.norm.name}: l = {readable(each.claim.floor)}{floor}, "
-            f"δ_max = {readable(each.claim.largest_delta)}, certified over found ε up to {readable(near, 3)} for "
+            f"{each.claim.norm.name}: l = {_typeset(at_most(each.claim.floor))}{floor}, "
+            f"δ_max = {_typeset(at_least(each.claim.largest_delta))}, "
+            f"certified over found ε up to {readable(near, 3)} for "
             f"δ ≤ δ_max/3 and {readable(each.ratio[-1], 3)} at δ_max"
         )
     return (
@@ -99,6 +101,10 @@ def _delta_caption(points: Sequence[Points]) -> str:
         "that were found to get as far as that ε, so that no δ(ε) can be higher there: the largest that is true lies "
         f"between line and dots. {'; '.join(said)}."
     )
+
+
+def _typeset(number: str) -> str:
+    return number.replace("-", "−")
 
 
 def _delta_panel(points: Points, ax: Axes) -> Axes:
@@ -137,12 +143,6 @@ class InTube:
     def off(self) -> Array:
         """x − x_lin (n, 14)."""
         return np.asarray(self.run.trajectory.columns([q.name for q in STATES]) - self.linear)
-
-
-def linear_motion(parameters: Parameters, times: Array) -> Array:
-    """x_lin (n, 14) from rest at t = 0, at times (n,) [s] from 0 on."""
-    form = car_form(car_of(parameters), order=1)
-    return linear_response(form.A, form.B, np.zeros(14), road_signal(road_parameters(parameters)), times).T
 
 
 def in_tube(run: Run, certificate: Certificate, proof: Proof) -> InTube:
@@ -188,16 +188,15 @@ def draw_tube(found: InTube) -> bytes:
 def _tube_caption(found: InTube, worst: Quantity) -> str:
     (epsilon, delta), norm, unit = found.row, found.claim.norm, UNITS[found.claim.norm.name]
     seen, (body, factor) = float(norm(found.off.T).max()), READING["m"]
-    widest = factor * float(np.nanmax(found.tube[:, 0]))
+    widest = _typeset(at_most(factor * float(np.nanmax(found.tube[:, 0])), 3))
     return (
         f"Definition 2.1 on this run. Above: body heave in the certified tube of all motions that start within "
-        f"δ = {readable(delta, 3)} {unit} of x_lin in the {norm.name} norm; they stay within "
-        f"ε = {readable(epsilon, 3)} {unit} of it for all t ≥ 0, and within {readable(widest, 3)} {body} in heave. "
+        f"δ = {_typeset(at_least(delta, 3))} {unit} of x_lin in the {norm.name} norm; they stay within "
+        f"ε = {_typeset(at_most(epsilon, 3))} {unit} of it for all t ≥ 0, and within {widest} {body} in heave. "
         f"Middle: {words(worst)}, which leaves x_lin by most for its size, with its certified bound for a start like "
-        "the run's, magnified. Below: the "
-        f"{norm.name} norm of x − x_lin with its bound; the floor is l = {readable(found.claim.floor, 5)} {unit}, the "
-        f"run reaches {readable(seen, 5)} {unit}. Bounds are of the exact motion: where the run lies above one, its "
-        "integrator's error is seen."
+        f"the run's, magnified. Below: the {norm.name} norm of x − x_lin with its bound; the floor is "
+        f"l = {_typeset(at_most(found.claim.floor, 5))} {unit}, the run reaches {readable(seen, 5)} {unit}. "
+        "Bounds are of the exact motion: where the run lies above one, its integrator's error is seen."
     )
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -20,9 +21,11 @@ from ..methods.polynomials import Array
 from ..reference import car_of, road_parameters
 from ..run_figures import DELTA, FOLDER, TUBE
 from ..trajectory import CERTIFICATE, Run
-from .car_certificates import certify_car
+from .car_certificates import car_norms, certify_car, linear_motion
 from .certificate_command import statement
-from .certificate_figures import adversary_points, draw_delta, draw_tube, in_tube, linear_motion
+from .certificate_figures import adversary_points, draw_delta, draw_tube, in_tube
+from .certificate_words import named_by_content
+from .directed import at_least, at_most
 from .run_certificates import acting
 
 
@@ -71,6 +74,7 @@ def definition_findings(run: Run, path: Path) -> tuple[list[Finding], str]:
     """
     certificate = from_json(path.read_bytes(), str(path))
     _refuse_another(run, certificate, path)
+    certificate = replace(certificate, claims=named_by_content(certificate.claims, car_norms(run.parameters)))
     if reason := silent(run) or _too_far(run, certificate):
         return [], reason
     x = run.trajectory.columns([q.name for q in STATES])
@@ -97,7 +101,7 @@ def _too_far(run: Run, certificate: Certificate) -> str:
         if not (size := float(claim.norm(x0))) < claim.largest_delta:
             return (
                 f"the run starts {size:.4g} off x_lin in the {claim.norm.name} norm; wanted less than "
-                f"{claim.largest_delta:.4g}"
+                f"{at_least(claim.largest_delta)}"
             )
     return ""
 
@@ -110,12 +114,12 @@ def _stays(claim: Claim, x: Array, off: Array, own: float) -> Finding:
     error = float(weighed.max() if claim.norm.largest else np.linalg.norm(weighed))
     return Finding(
         claim=f"the run is as near x_lin as the certificate says of every motion that starts within "
-        f"{delta:.4g} of it: largest N(x - x_lin), N the {claim.norm.name} norm",
+        f"{at_least(delta)} of it: largest N(x - x_lin), N the {claim.norm.name} norm",
         equation="definition 2.1",
         measured=reached,
         expected=0.0,
         tolerance=epsilon + error,
         unit={"energy": "J^0.5", "weighted sup": "1"}.get(claim.norm.name, "SI"),
-        source=f"{CERTIFICATE}; start {start:.4g} off, certified {epsilon:.6g}, certified over reached "
+        source=f"{CERTIFICATE}; start {start:.4g} off, certified {at_most(epsilon, 6)}, certified over reached "
         f"{epsilon / reached if reached else np.inf:.4g}; own error up to {error:.2g}",
     )

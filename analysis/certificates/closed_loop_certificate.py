@@ -16,7 +16,7 @@ from fmu_src.controller.hardware import Hardware
 from fmu_src.controller.law import control_parameters
 
 from ..bertolino_baksa.balls import NotProvedError
-from ..bertolino_baksa.certificate import Certificate, Claim, to_json
+from ..bertolino_baksa.certificate import Certificate, to_json
 from ..bertolino_baksa.proof import Proof
 from ..errors import InputError
 from ..files import write_whole
@@ -52,8 +52,7 @@ def refuse_hardware(parameters: Parameters) -> None:
 def both(parameters: Parameters) -> tuple[tuple[Certificate, Proof], tuple[Certificate, Proof]]:
     """The passive certificate and the one under control, in the same norms. Raises NotProvedError if one is none."""
     passive = certify_car(parameters)
-    named = tuple(claim.norm for claim in passive[0].claims)
-    return passive, certify_car(parameters, infinite_gain(parameters), named)
+    return passive, certify_car(parameters, infinite_gain(parameters))
 
 
 def command(parameters: Parameters, where: Path | None) -> int:
@@ -61,11 +60,12 @@ def command(parameters: Parameters, where: Path | None) -> int:
     print("Finding and proving a reference motion without and with control ...", file=sys.stderr, flush=True)
     try:
         passive, closed = both(parameters)
+        said = [statement(*made) for made in (passive, closed)]
     except NotProvedError as error:
         print(f"no certificate: {error}")
         return 1
-    for title, made in (("without control", passive), ("with control for all t >= 0", closed)):
-        print("\n".join([f"{title}:", *statement(*made)]))
+    for title, lines in zip(("without control", "with control for all t >= 0"), said, strict=True):
+        print("\n".join([f"{title}:", *lines]))
     print("\n".join(["what control changes, each norm the same for both:", *comparison(passive[0], closed[0])]))
     if where is not None:
         write_whole(where, to_json(closed[0]))
@@ -74,20 +74,17 @@ def command(parameters: Parameters, where: Path | None) -> int:
 
 
 def comparison(passive: Certificate, closed: Certificate) -> list[str]:
-    """l, the largest δ, and δ at the same ε of both, norm by norm; between rows of the tables by interpolation."""
+    """The proved l, the largest δ, and δ at the same ε of both, norm by norm; ε where both claim something."""
     lines = []
     for before, after in zip(passive.claims, closed.claims, strict=True):
-        top = min(before.table[-1, 0], after.table[-1, 0])
+        least, top = max(before.floor, after.floor), min(before.table[-1, 0], after.table[-1, 0])
         wider = ", ".join(
-            f"{_delta(after, e) / _delta(before, e):.3g} at eps = {e:.3g}" for e in (s * top for s in SHARES)
+            f"{after.delta(e) / before.delta(e):.3g} at eps = {e:.3g}"
+            for e in (float(share * top) for share in SHARES)
+            if e >= least
         )
         lines.append(
             f"  {before.norm.name} norm: l times {after.floor / before.floor:.4g}; largest delta times "
             f"{after.largest_delta / before.largest_delta:.3g}; delta times {wider}"
         )
     return lines
-
-
-def _delta(claim: Claim, epsilon: float) -> float:
-    """δ at ε, with (log ε, log δ) on chords between the rows of the table."""
-    return float(np.exp(np.interp(np.log(epsilon), *np.log(claim.table.T))))
