@@ -21,7 +21,7 @@ from .adversary import motions
 from .balls import Array, ExactSystem, NotProvedError, matrix, rounded
 from .cells import CELLS, Decay, decay
 from .majorant import Majorant, majorant
-from .norms import Metric, Norm
+from .norms import Metric, Norm, usable_inverse
 from .tube import Piece, input_matrix
 
 TURN = 0.06  # rad that the fastest mode turns over a cell
@@ -72,8 +72,9 @@ class Gains:
     def epsilon(self, W: Array, norm: Norm, delta: Sequence[float]) -> list[float]:
         """ε for each δ: N(x(0)) ≤ δ and |w| ≤ W imply N(x(t)) ≤ ε for all t ≥ 0.
 
-        Raises NotProvedError if there is none for one of them.
+        Raises NotProvedError if there is none for one of them, or for a norm that floats cannot compute.
         """
+        usable_inverse(norm.T, f"matrix of the {norm.name} norm")
         one, spread, kappa = np.eye(self.system.n), self.spread(norm), float(self.decay.of(norm).max())
         driven = self.decay.integral(self.metric, norm.T, input_matrix(self.system)) @ W
         by_rates = self.decay.integral(self.metric, norm.T, matrix(one))
