@@ -14,7 +14,7 @@ import pytest
 from made_up_run import made_up_run
 from matplotlib.figure import Figure
 
-from analysis.__main__ import main
+from analysis.__main__ import _certify_shortly, main
 from analysis.bertolino_baksa.adversary import _vertices, motions
 from analysis.bertolino_baksa.certificate import Certificate, from_json, to_json
 from analysis.bertolino_baksa.funnel import ends, funnel
@@ -37,7 +37,7 @@ from analysis.figures import described
 from analysis.methods.linear_response import linear_response
 from analysis.reference import car_of, road_parameters
 from analysis.scenario import read_scenario
-from analysis.trajectory import Run, write_run
+from analysis.trajectory import Run, read_run, write_run
 from fmu_src.quantities import STATES
 
 NAMES = [q.name for q in STATES]
@@ -224,6 +224,17 @@ def test_certify_draws_delta_beside_the_certificate(tmp_path: Path) -> None:
     claim = from_json((tmp_path / "c.json").read_bytes(), "c.json").claims[0]
     assert "how far" in title and f"δ_max = {claim.largest_delta:.4g}" in caption
     assert main(["certify", "bump", "-o", str(tmp_path / "c.svg")]) == 2
+
+
+@pytest.mark.usefixtures("at_hand")
+def test_a_run_is_certified_on_the_way_if_its_road_ends(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    endless = made_up_run()
+    endless.record["parameters"]["road"]["profile"] = "sine"
+    for run, said in ((endless, "the road has no end"), (made_up_run(enabled=True), "the actuators act")):
+        _certify_shortly(run, folder)
+        assert said in capsys.readouterr().err and not (folder / "certificate.json").exists()
+    _certify_shortly(read_run(folder), folder)
+    assert (folder / "certificate.json").is_file()
 
 
 def test_runs_of_which_the_certificate_says_nothing_have_a_reason(
