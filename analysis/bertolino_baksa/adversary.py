@@ -92,7 +92,7 @@ def worst(
     crowd = _furthest(form, norm, delta, *_errors(form, signal, x0, stop), CANDIDATES)
     best, at = 0.0, crowd[:, 0]
     for _ in range(rounds + 1):
-        times, off = _offsets(form, signal, x0, crowd, stop)
+        _, off = _offsets(form, signal, x0, crowd, stop)
         sizes = norm(off)  # (times, K)
         if not sizes.max() > best:
             break

@@ -40,7 +40,7 @@ class Decay:
         return (np.maximum(sizes[:-1], sizes[1:]) + bend) * (1 + EPS) + off
 
     def turned(self, norm: Norm) -> tuple[Array, Array, float]:
-        """T e^(At) T⁻¹ at the cells' ends (N + 1, n, n), how far (N, n, n) it may leave the chords, and its rounding."""
+        """T e^(At) T⁻¹ at the cells' ends (N + 1, n, n), how far (N, n, n) it may leave chords, and its rounding."""
         inverse, rest = rounded(matrix(norm.T).inv())
         curve = np.abs(norm.T) @ self.curve @ np.abs(inverse)
         return norm.T @ self.ends @ inverse, curve * (1 + EPS), self._rounding(norm.T, inverse, rest)

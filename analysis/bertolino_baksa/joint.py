@@ -1,4 +1,4 @@
-"""How large e + e^(At) y + q can be over a cell, for all N(y) ≤ δ: each is largest at another time, in another direction.
+"""How large e + e^(At) y + q can be over a cell, for N(y) ≤ δ: each is largest at another time, in another direction.
 
 With z = T y and M = T e^(At) T⁻¹, row by row |(T e)_i| + Σ_j |M_ij| δ where the norm is a maximum, and for ‖·‖₂ by
 Lagrange's dual, which has no gap here: for every μ above all singular values s of M = U diag(s) Vᵀ, and g = Uᵀ T e,
