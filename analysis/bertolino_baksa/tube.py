@@ -129,6 +129,7 @@ def prove_linear(system: ExactSystem, metric: Metric, pieces: Sequence[Piece]) -
 
 
 def refuse_gaps(pieces: Sequence[Piece]) -> None:
+    """Raise NotProvedError unless each piece begins where the one before it ends."""
     for k, (piece, following) in enumerate(pairwise(pieces)):
         if piece.end != following.begin:
             raise NotProvedError(f"pieces {k} and {k + 1} do not follow each other")
