@@ -152,6 +152,13 @@ def test_a_motion_that_runs_away_has_no_certificate() -> None:
         certified(cubic, 1, x0=[2.01])
 
 
+def test_an_input_that_is_not_over_is_not_taken_for_none() -> None:
+    form = standard_form(duffing, ["x", "v"], 1)
+    endless = build(duffing, 2, swinging, fmpq(0))
+    with pytest.raises(NotProvedError, match="not proved to be flat"):
+        certify({}, endless, modal_metric(form.A, np.eye(2)), lambda x: (euclid(2),), [fmpq(30)], np.zeros(2))
+
+
 def test_a_claimed_period_that_is_none_is_refused() -> None:
     form = standard_form(duffing, ["x", "v"], 1)
     wrong = build(duffing, 2, swinging, fmpq(1))

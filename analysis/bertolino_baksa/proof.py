@@ -100,8 +100,11 @@ def prove(system: ExactSystem, metric: Metric, pieces: Sequence[Piece], x0: Sequ
     """Prove what can be proved from these pieces. Raises NotProvedError if they do not suffice."""
     if pieces[0].begin != 0:
         raise NotProvedError(f"the first piece begins at t = {float(pieces[0].begin):g} s; wanted 0")
-    if pieces[-1].end < system.pieces[-1][0]:
+    corner, last = system.pieces[-1]
+    if pieces[-1].end < corner:
         raise NotProvedError("the pieces end before the road's last corner")
+    if system.period == 0 and not all(w == 0 for w in last(arb(0, math.inf))):
+        raise NotProvedError("the road has no period, and after its last corner it is not proved to be flat")
     tube = prove_tube(system, metric, pieces, (np.array(x0, dtype=float), np.zeros(system.n)))
     X = np.hstack([ranges(tube.pieces, tube.full, metric), inputs(system, metric, tube.pieces)])
     again = _repetition(system, metric, tube) if system.period != 0 else None
