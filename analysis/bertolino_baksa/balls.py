@@ -57,6 +57,14 @@ class ExactSystem:
         return self.inputs_at(begin)
 
 
+def refuse_unrest(system: ExactSystem) -> None:
+    """Raise NotProvedError unless F(0, 0) = 0 exactly, as bounds of F(x, w) − A x − B w from its terms in x, w need."""
+    rates = system.equations([arb(0)] * system.n, [arb(0)] * system.m, sine, cosine)
+    for i, rate in enumerate(rates):
+        if not arb(rate) == 0:
+            raise NotProvedError(f"row {i} of F(0, 0) is {rate}; wanted exactly 0, a system that rests without input")
+
+
 @contextmanager
 def precision(terms: int) -> Iterator[None]:
     """Work with BITS bits and series of this many terms."""

@@ -13,16 +13,18 @@ from dataclasses import dataclass
 import numpy as np
 from flint import arb
 
-from .balls import Array, ExactSystem, NotProvedError, above, column, jacobian
+from .balls import Array, ExactSystem, NotProvedError, above, column, jacobian, refuse_unrest
 from .cells import Decay, decay, errors, inputs, ranges
 from .growth import perturbed
 from .majorant import Majorant, majorant
-from .norms import Metric, Norm
+from .norms import Metric, Norm, usable_inverse
 from .tube import Off, Piece, Tube, both, followed, jumps, prove_tube
 
 SETTLED = 1e-3
 ROOM = 1.5  # of the box on which the equations are bounded, over the largest motion
 ROOM_INPUT = 10.0  # the same for inputs, so that a quiet motion under a large input is not taken for a large one
+
+UNDERFLOW = 1e-80  # squares that floats round to 0 make less than 1e-154, times sizes within `norms.RANGE`
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,8 +56,9 @@ class Proof:
     def epsilon(self, norm: Norm, delta: Array) -> Array:
         """ε (K,) for δ (K,) ≥ 0: N(x(0) − ψ(0)) ≤ δ implies N(x(t) − ψ(t)) ≤ ε for all t ≥ 0; inf if not proved.
 
-        ε(0) bounds the floor l.
+        ε(0) bounds the floor l. Raises NotProvedError for a norm that floats cannot compute.
         """
+        usable_inverse(norm.T, f"matrix of the {norm.name} norm")
         rows, kappa, c = self.decay.rows(norm), self.decay.of(norm), self.metric.of(norm)
         bound = self.majorant(rows.max(axis=0) * delta.max())
         spread = np.zeros((*self.X.shape, len(delta)))
@@ -63,11 +66,11 @@ class Proof:
         top, end = perturbed(self.metric, bound, self.decay.width, self.X, spread, np.zeros(len(delta)))
         on_pieces = errors(self.tube, self.metric, norm)[:, None] + kappa[:, None] * delta + c * top
         later = self._later(norm, bound, self.decay.at_end(self.metric, norm) * delta + end)
-        return np.maximum(on_pieces.max(axis=0), later) * (1.0 + 1e-9)
+        return np.maximum(on_pieces.max(axis=0), later) * (1.0 + 1e-9) + UNDERFLOW
 
     def settled(self, norm: Norm, floor: float) -> bool:
         """Whether longer pieces would lower this floor by less than SETTLED of it: the tail has no part in it."""
-        return floor <= (1.0 + SETTLED) * float(errors(self.tube, self.metric, norm).max())
+        return floor <= (1.0 + SETTLED) * float(errors(self.tube, self.metric, norm).max()) + UNDERFLOW
 
     def majorant(self, spread: Array) -> Majorant:
         """R̄ on a box with room for motions that are off the reference by `spread` (n,)."""
@@ -98,6 +101,7 @@ class Proof:
 
 def prove(system: ExactSystem, metric: Metric, pieces: Sequence[Piece], x0: Sequence[float]) -> Proof:
     """Prove what can be proved from these pieces. Raises NotProvedError if they do not suffice."""
+    refuse_unrest(system)
     if pieces[0].begin != 0:
         raise NotProvedError(f"the first piece begins at t = {float(pieces[0].begin):g} s; wanted 0")
     corner, last = system.pieces[-1]
