@@ -14,7 +14,7 @@ from flint import arb, arb_series, ctx, fmpq
 
 from analysis.bertolino_baksa.adversary import excursions, reference_floor
 from analysis.bertolino_baksa.balls import ExactSystem, NotProvedError, above, decimal, length, precision, two_norm
-from analysis.bertolino_baksa.bounded_inputs import gains
+from analysis.bertolino_baksa.bounded_inputs import Bounds, gains
 from analysis.bertolino_baksa.certificate import Certificate, certify, from_json, to_json, verify
 from analysis.bertolino_baksa.majorant import SECANT, majorant
 from analysis.bertolino_baksa.norms import Norm, euclid, modal_metric, proved_metric, weighted_sup
@@ -199,7 +199,7 @@ def test_a_system_that_does_not_rest_without_input_is_refused() -> None:
         with pytest.raises(NotProvedError, match="row 0 of F"):
             quick_floors(made({}), metric, [euclid(1)], [0.0], fmpq(5))
         with pytest.raises(NotProvedError, match="row 0 of F"):
-            gains(made({}), metric).motion(np.zeros(1), np.zeros(1))
+            gains(made({}), metric).under(Bounds(np.zeros(1))).motion(np.zeros(1))
 
 
 def test_the_majorant_ends_before_a_pole() -> None:
