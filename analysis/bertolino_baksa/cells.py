@@ -6,7 +6,7 @@ bounds here are values at the cells' ends plus a term of second order in the cel
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -33,19 +33,24 @@ class Decay:
 
     def of(self, norm: Norm) -> Array:
         """κ (N,) ≥ sup N(e^(At) y)/N(y) over each cell."""
-        inverse, rest = rounded(matrix(norm.T).inv())
-        moved, curve = norm.T @ self.ends @ inverse, np.abs(norm.T) @ self.curve @ np.abs(inverse)
-        off = self._rounding(norm.T, inverse, rest)
+        moved, curve, off = self.turned(norm)
         sizes = np.abs(moved).sum(axis=2).max(axis=1) if norm.largest else two_norm(moved)
         bend = curve.sum(axis=2).max(axis=1) if norm.largest else np.sqrt((curve**2).sum(axis=(1, 2)))
         return (np.maximum(sizes[:-1], sizes[1:]) + bend) * (1 + EPS) + off
 
-    def rows(self, norm: Norm) -> Array:
-        """κ_j (N, n) ≥ sup |(e^(At) y)_j|/N(y) over each cell."""
+    def turned(self, norm: Norm) -> tuple[Array, Array, float]:
+        """T e^(At) T⁻¹ at the cells' ends (N + 1, n, n), how far (N, n, n) it may leave chords, and its rounding."""
         inverse, rest = rounded(matrix(norm.T).inv())
+        curve = np.abs(norm.T) @ self.curve @ np.abs(inverse)
+        return norm.T @ self.ends @ inverse, curve * (1 + EPS), self._rounding(norm.T, inverse, rest)
+
+    def rows(self, norm: Norm, left: Array | None = None) -> Array:
+        """κ_j (N, p) ≥ sup |(left e^(At) y)_j|/N(y) over each cell; left (p, n) is exact, 1 if not given."""
+        inverse, rest = rounded(matrix(norm.T).inv())
+        left = np.eye(len(norm.T)) if left is None else left
         dual = (lambda m: np.abs(m).sum(axis=2)) if norm.largest else (lambda m: np.sqrt((m**2).sum(axis=2)))
-        sizes, bend = dual(self.ends @ inverse), dual(self.curve @ np.abs(inverse))
-        off = self._rounding(np.eye(len(norm.T)), inverse, rest)
+        sizes, bend = dual(left @ self.ends @ inverse), dual(np.abs(left) @ self.curve @ np.abs(inverse))
+        off = self._rounding(left, inverse, rest)
         return (np.maximum(sizes[:-1], sizes[1:]) + bend) * (1 + EPS) + off
 
     def at_end(self, metric: Metric, norm: Norm) -> float:
@@ -144,14 +149,21 @@ def inputs(system: ExactSystem, metric: Metric, pieces: Sequence[Piece]) -> Arra
 def errors(tube: Tube, metric: Metric, norm: Norm) -> Array:
     """sup N(e) over each of the cells of `decay`, from finer ones in it."""
     found, c = [], metric.of(norm)
-    for piece, count, V in zip(tube.pieces, counts(tube.pieces, metric), tube.error, strict=True):
+    for values, bend, V in finely(tube, metric, norm):
+        sizes = np.abs(values).max(axis=1) if norm.largest else np.sqrt((values**2).sum(axis=1))
+        curved = bend.max() if norm.largest else np.sqrt((bend**2).sum())
+        found.append(sizes.max(axis=1) + curved + c * V)
+    return np.concatenate(found) * (1 + EPS)
+
+
+def finely(tube: Tube, metric: Metric, norm: Norm) -> Iterator[tuple[Array, Array, float]]:
+    """Of each piece: T p at finer cells' ends, p near e, by the cells of `decay` (cells, n, parts + 1); how far (n,) it
+    may leave the chords between; and V."""
+    for piece, count, V in zip(tube.pieces, counts(tube.pieces, metric), tube.error.tolist(), strict=True):
         sizes = np.abs(norm.T) @ np.abs(piece.error)
         values, bend = _sampled(norm.T @ piece.error, FINE, sizes)
-        sizes = np.abs(values).max(axis=0) if norm.largest else np.sqrt((values**2).sum(axis=0))
-        curved = bend.max() if norm.largest else np.sqrt((bend**2).sum())
-        fine = np.maximum(sizes[:-1], sizes[1:]) + curved + c * V
-        found.append(fine.reshape(count, -1).max(axis=1))
-    return np.concatenate(found) * (1 + EPS)
+        at = np.arange(count)[:, None] * (FINE // count) + np.arange(FINE // count + 1)
+        yield values[:, at].swapaxes(0, 1), bend, V
 
 
 def _sampled(coefficients: Array, cells: int, sizes: Array | None = None, begin: float = 0.0) -> tuple[Array, Array]:

@@ -16,6 +16,7 @@ from flint import arb
 from .balls import Array, ExactSystem, NotProvedError, above, jacobian, refuse_unrest
 from .cells import Decay, decay, errors, inputs, ranges
 from .growth import perturbed
+from .joint import largest
 from .majorant import Majorant, majorant
 from .norms import Metric, Norm, usable_inverse
 from .tube import Off, Piece, Tube, at_end, followed, jumps, prove_tube
@@ -59,12 +60,12 @@ class Proof:
         ε(0) bounds the floor l. Raises NotProvedError for a norm that floats cannot compute.
         """
         usable_inverse(norm.T, f"matrix of the {norm.name} norm")
-        rows, kappa, c = self.decay.rows(norm), self.decay.of(norm), self.metric.of(norm)
+        rows = self.decay.rows(norm)
         bound = self.majorant(rows.max(axis=0) * delta.max())
         spread = np.zeros((*self.X.shape, len(delta)))
         spread[:, : self.system.n] = rows[:, :, None] * delta
         top, end = perturbed(self.metric, bound, self.decay.width, self.X, spread, np.zeros(len(delta)))
-        on_pieces = errors(self.tube, self.metric, norm)[:, None] + kappa[:, None] * delta + c * top
+        on_pieces = largest(self.tube, self.metric, self.decay, norm, delta, top)
         later = self._later(norm, bound, self.decay.at_end(self.metric, norm) * delta + end)
         return np.maximum(on_pieces.max(axis=0), later) * (1.0 + 1e-9) + UNDERFLOW
 
