@@ -86,6 +86,18 @@ def test_the_traps_of_ball_arithmetic_are_closed() -> None:
     np.testing.assert_allclose(two_norm(m), exact, rtol=1e-10)
 
 
+def test_a_bound_of_a_norm_does_not_trust_its_eigenvectors(monkeypatch: pytest.MonkeyPatch) -> None:
+    m, eigh = np.random.default_rng(3).normal(size=(4, 4)), np.linalg.eigh
+    exact = np.linalg.norm(m, 2)
+    for wrong, worst in ((1e-5, 1.0 + 1e-4), (0.1, None), (np.nan, None)):
+        monkeypatch.setattr(np.linalg, "eigh", lambda a, wrong=wrong: (eigh(a)[0], eigh(a)[1] * (1.0 - wrong)))
+        if worst:
+            assert exact <= two_norm(m) <= worst * exact
+        else:
+            with pytest.raises(NotProvedError, match="orthogonal"):
+                two_norm(m)
+
+
 @pytest.mark.parametrize("equations", [duffing, pendulum])
 def test_the_majorant_is_one_and_it_is_close(equations: Equations) -> None:
     """R(x + y) − R(x) never changes by more than it says, at random points; but the worst comes near."""

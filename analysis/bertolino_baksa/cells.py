@@ -11,7 +11,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from flint import arb, arb_mat
-from scipy.linalg import expm
 
 from .balls import Array, ExactSystem, above, magnitudes, matrix, rounded, two_norm
 from .norms import Metric, Norm
@@ -92,7 +91,7 @@ def decay(metric: Metric, pieces: tuple[Piece, ...]) -> Decay:
     """
     A = metric.A
     now, ends, off, dropped = matrix(np.eye(A.nrows())), [np.eye(A.nrows())], 0.0, 0.0
-    A_size, S_size = np.abs(rounded(A)[0]), float(np.linalg.norm(metric.S)) * (1 + EPS)
+    S_size = float(np.linalg.norm(metric.S)) * (1 + EPS)
     steps: dict[tuple[int, int], arb_mat] = {}  # e^(AΔ) by Δ's numerator and denominator
     for p, count in zip(pieces, counts(pieces, metric), strict=True):
         width = p.duration / count
@@ -109,8 +108,9 @@ def decay(metric: Metric, pieces: tuple[Piece, ...]) -> Decay:
     off += float(np.linalg.norm(metric.reach)) * dropped * (1 + 1e-9)
     values, width = np.array(ends), widths(pieces, metric)
     distinct, where = np.unique(width, return_inverse=True)
-    spread = np.array([expm(A_size * w * (1 + EPS)) for w in distinct])[where]  # ≥ |e^(As)|, 0 ≤ s ≤ Δ
-    second = np.abs((rounded(A)[0] @ rounded(A)[0]) @ values[:-1])
+    A_size = arb_mat(A.nrows(), A.ncols(), [abs(v) for v in A.entries()])
+    spread = np.array([magnitudes((A_size * arb(w)).exp()) for w in distinct.tolist()])[where]  # ≥ |e^(As)|, 0 ≤ s ≤ Δ
+    second = np.abs(rounded(A * A)[0] @ values[:-1])
     second += 1e-9 * second.max()  # its rounding, with much to spare
     curve = (second @ spread) * (width**2 / 8)[:, None, None] * (1 + 1e-9)
     return Decay(width, values, curve, off)

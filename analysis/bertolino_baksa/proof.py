@@ -13,13 +13,13 @@ from dataclasses import dataclass
 import numpy as np
 from flint import arb
 
-from .balls import Array, ExactSystem, NotProvedError, above, column, jacobian, refuse_unrest
+from .balls import Array, ExactSystem, NotProvedError, above, jacobian, refuse_unrest
 from .cells import Decay, decay, errors, inputs, ranges
 from .growth import perturbed
 from .joint import largest
 from .majorant import Majorant, majorant
 from .norms import Metric, Norm, usable_inverse
-from .tube import Off, Piece, Tube, both, followed, jumps, prove_tube
+from .tube import Off, Piece, Tube, at_end, followed, jumps, prove_tube
 
 SETTLED = 1e-3
 ROOM = 1.5  # of the box on which the equations are bounded, over the largest motion
@@ -94,8 +94,8 @@ class Proof:
     def ends(self) -> tuple[float, float]:
         """Bounds of ‖x‖_S and ‖e‖_S at the end of the last piece."""
         last = self.tube.pieces[-1]
-        x = self.metric.length(column([sum(row, arb(0)) for row in both(last)]))
-        e = self.metric.length(column([sum((arb(v) for v in row), arb(0)) for row in last.error.tolist()]))
+        x = self.metric.length(at_end(last.linear) + at_end(last.error))
+        e = self.metric.length(at_end(last.error))
         _, V, V_e = self.tube.at_end
         return (x + V) * (1.0 + 1e-15), (e + V_e) * (1.0 + 1e-15)
 

@@ -8,16 +8,16 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from flint import arb, fmpq
+from flint import fmpq
 
-from .balls import ExactSystem, NotProvedError, column
+from .balls import ExactSystem, NotProvedError
 from .cells import inputs, ranges, widths
 from .growth import perturbed
 from .majorant import majorant
 from .norms import Metric, Norm
 from .proof import rest_growth
 from .taylor import find_pieces
-from .tube import prove_linear
+from .tube import at_end, prove_linear
 
 ROOM = 2.0  # of the box, over x_lin
 
@@ -34,8 +34,8 @@ def quick_floors(
     bound = majorant(system, ROOM * spread.max(axis=0) + 1e-9)
     start = np.zeros_like(spread)
     top, end = perturbed(metric, bound, widths(pieces, metric), start, spread[:, :, None], np.zeros(1))
-    last = metric.length(column([arb(v) for v in pieces[-1].linear.sum(axis=1).tolist()])) * (1 + 1e-12) + off[-1]
-    size = last + float(end[0])
+    last = metric.length(at_end(pieces[-1].linear)) + float(off[-1])
+    size = (last + float(end[0])) * (1.0 + 1e-12)
     L = rest_growth(system, metric, size)
     if not metric.alpha > L:
         raise NotProvedError("the quick comparison cannot follow so large a motion")
