@@ -79,21 +79,12 @@ class Proof:
         """sup N(e + y) after the last piece, where ‖y‖_S begins with `off` (K,)."""
         c = self.metric.of(norm)
         if self.repetition is None:
-            return np.array([c * self._at_rest(u) for u in off.tolist()])
+            return np.array([c * at_rest(self.system, self.metric, *self.ends, u) for u in off.tolist()])
         window, X = self.repetition.window, self.repetition.X
         widths, off = self.decay.width[-len(X) :], off + 1e-9 * self.ends[0]  # room for roundings where nothing is off
         top, end = perturbed(self.metric, bound, widths, X, np.zeros((*X.shape, len(off))), off)
         most = errors(window, self.metric, norm).max() + c * top.max(axis=0)
         return np.where(end <= off, most, np.inf)
-
-    def _at_rest(self, off: float) -> float:
-        """sup ‖e + y‖_S on the flat road, where x' = A x + R(x) and ‖R(x)‖ ≤ L ‖x‖ with L < α: x → 0, as x_lin does."""
-        x, e = self.ends
-        size = (x + off) * (1.0 + 1e-12)
-        L = rest_growth(self.system, self.metric, size)
-        if not self.metric.alpha > L:
-            return np.inf
-        return (e + off + L * size / (self.metric.alpha - L)) * (1.0 + 1e-12)
 
     @property
     def ends(self) -> tuple[float, float]:
@@ -152,6 +143,18 @@ def _window(system: ExactSystem, pieces: Sequence[Piece]) -> int:
         if periods.denominator == 1 and pieces[k].begin >= system.pieces[-1][0]:
             return k
     raise NotProvedError("no whole number of periods at the end of the pieces")
+
+
+def at_rest(system: ExactSystem, metric: Metric, x: float, e: float, off: float) -> float:
+    """sup ‖e + y‖_S on the flat road, from ‖x‖, ‖e‖ and ‖y‖ = off on; inf if there is no bound.
+
+    There x' = A x + R(x), and ‖R(x)‖ ≤ L ‖x‖ with L < α: x → 0, as x_lin does.
+    """
+    size = (x + off) * (1.0 + 1e-12)
+    L = rest_growth(system, metric, size)
+    if not metric.alpha > L:
+        return np.inf
+    return (e + off + L * size / (metric.alpha - L)) * (1.0 + 1e-12)
 
 
 def rest_growth(system: ExactSystem, metric: Metric, size: float) -> float:

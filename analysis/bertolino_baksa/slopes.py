@@ -33,9 +33,14 @@ def largest_outputs(
     begin = left @ start
     off = len(left.T) * np.abs(left).sum() * (rest + EPS * np.abs(start).sum())
     values = left @ decay.ends @ both
+
+    def bound(u: Array) -> Array:
+        variation = np.abs(begin - u[0]) + off + np.abs(np.diff(u, axis=0)).sum(axis=0)
+        return (A * variation + V * decay.integral(metric, left, K + of_slopes, u)) * (1.0 + 1e-9)
+
     u = _smoothed(values, begin, decay.width, A, V)
-    variation = np.abs(begin - u[0]) + off + np.abs(np.diff(u, axis=0)).sum(axis=0)
-    return (A * variation + V * decay.integral(metric, left, K + of_slopes, u)) * (1.0 + 1e-9)
+    least = SMALLEST * np.abs(values).max(axis=0)
+    return np.minimum(bound(u), bound(np.where(np.abs(u) <= least, 0.0, u)))  # between the least levels, u or 0
 
 
 def _smoothed(values: Array, begin: Array, width: Array, A: Array, V: Array) -> Array:

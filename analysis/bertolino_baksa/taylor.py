@@ -16,10 +16,18 @@ LAST_TERM = 1e-13  # of a polynomial, over the size of the motion: it sets the l
 LONGEST, SHORTEST = 0.25, 1e-5  # s
 
 
-def find_pieces(system: ExactSystem, x0: Sequence[float], stop: fmpq, *, linear_only: bool = False) -> list[Piece]:
+def find_pieces(
+    system: ExactSystem,
+    x0: Sequence[float],
+    stop: fmpq,
+    *,
+    linear_only: bool = False,
+    changing: ExactSystem | None = None,
+) -> list[Piece]:
     """Pieces from x(0) = x0 [exact doubles] to `stop`, none across a corner of the input or the last period's begin.
 
     linear_only : e is left at 0.
+    changing    : what x_lin obeys, if its A changes in time.
     """
     zero = [arb(0)]
     A = jacobian(system, zero * system.n, zero * system.m)
@@ -30,7 +38,7 @@ def find_pieces(system: ExactSystem, x0: Sequence[float], stop: fmpq, *, linear_
     while t < stop:
         with precision(DEGREE + 1):
             w = system.inputs_at(t)(arb_series([arb(t), 1]))
-        linear = _linear_taylor(A, B, x_lin, w)
+        linear = _taylor(changing, w, x_lin.entries()) if changing else _linear_taylor(A, B, x_lin, w)
         full = linear if linear_only else _taylor(system, w, x)
         size = max(size, *(abs(float(c[0])) for c in full))
         h = _length(full, size)

@@ -35,6 +35,7 @@ from .balls import (
 )
 from .norms import Metric
 
+Excess = Callable[[Balls, Balls], arb_mat]
 Outputs = Callable[[Sequence[Any], Sequence[Any], Any, Any], Sequence[Any]]
 MIDDLE, WHOLE = arb(0.5), arb(0.5, 0.5)  # of a piece, as τ
 MORE = 4  # terms of a defect's series beyond the polynomials' degree; what is left is enclosed
@@ -85,7 +86,7 @@ def prove_tube(
     Raises NotProvedError where the pieces leave a gap or lie across a corner of w, or the tube cannot be closed.
     """
     B = input_matrix(system)
-    defects = [(_linear_defect(system, metric, B, p), _defect(system, metric, p)) for p in pieces]
+    defects = [(_linear_defect(system, metric, B, p), defect_of(system, metric, p, both(p))) for p in pieces]
     return followed(system, metric, pieces, np.array(defects), start, (*off, off[0] + off[1]))
 
 
@@ -93,15 +94,19 @@ def followed(
     system: ExactSystem, metric: Metric, pieces: Sequence[Piece], defects: Array, start: tuple[Array, Array], off: Off
 ) -> Tube:
     """The tube around pieces with these defects (pieces, 2), as of `prove_tube`; it raises the same."""
+
+    def excess(x: Balls, w: Balls) -> arb_mat:
+        return jacobian(system, x, w) - metric.A
+
     V_lin, V, V_e = off
     before = start[0][:, None], start[1][:, None]
     widths, rates = [], []
-    _refuse_gaps(pieces)
+    refuse_gaps(pieces)
     for piece, (d_lin, d) in zip(pieces, defects.tolist(), strict=True):
         V_lin, V, V_e = (v + jump for v, jump in zip((V_lin, V, V_e), jumps(metric, before, piece), strict=True))
-        after, L = _closed(system, metric, piece, V, d)
-        after_lin, full = _grown(V_lin, -metric.alpha, d_lin, piece), max(V, after)
-        after_e = _grown(V_e, -metric.alpha, (L * full + d_lin + d) * (1.0 + 1e-15), piece)
+        after, L = closed(system, metric, piece, V, d, excess, -metric.alpha)
+        after_lin, full = grown(V_lin, -metric.alpha, d_lin, piece), max(V, after)
+        after_e = grown(V_e, -metric.alpha, (L * full + d_lin + d) * (1.0 + 1e-15), piece)
         widths.append((max(V_lin, after_lin), full, max(V_e, after_e)))
         rates.append(L - metric.alpha)
         V_lin, V, V_e = after_lin, after, after_e
@@ -114,16 +119,16 @@ def prove_linear(system: ExactSystem, metric: Metric, pieces: Sequence[Piece]) -
     """V (pieces,) of x_lin alone, from x_lin(0) = the first piece's begin on. Raises NotProvedError for a gap."""
     B, V, before = input_matrix(system), 0.0, (pieces[0].linear[:, :1], pieces[0].error[:, :1])
     found = []
-    _refuse_gaps(pieces)
+    refuse_gaps(pieces)
     for piece in pieces:
         V += jumps(metric, before, piece)[0]
-        after = _grown(V, -metric.alpha, _linear_defect(system, metric, B, piece), piece)
+        after = grown(V, -metric.alpha, _linear_defect(system, metric, B, piece), piece)
         found.append(max(V, after))
         V, before = after, (piece.linear, piece.error)
     return np.array(found)
 
 
-def _refuse_gaps(pieces: Sequence[Piece]) -> None:
+def refuse_gaps(pieces: Sequence[Piece]) -> None:
     for k, (piece, following) in enumerate(pairwise(pieces)):
         if piece.end != following.begin:
             raise NotProvedError(f"pieces {k} and {k + 1} do not follow each other")
@@ -148,7 +153,7 @@ def jumps(metric: Metric, before: tuple[Array, Array], piece: Piece) -> Off:
     return metric.length(linear), metric.length(linear + error), metric.length(error)
 
 
-def _grown(V: float, rate: float, defect: float, piece: Piece) -> float:
+def grown(V: float, rate: float, defect: float, piece: Piece) -> float:
     """V at the piece's end under V' = rate V + defect."""
     h = arb(piece.duration)
     factor = (arb(rate) * h).exp()
@@ -189,14 +194,14 @@ def _linear_defect(system: ExactSystem, metric: Metric, B: arb_mat, piece: Piece
     return _sup_length(metric, defect.entries(), terms)
 
 
-def _defect(system: ExactSystem, metric: Metric, piece: Piece) -> float:
-    """sup ‖F(p, w) − p'‖_S [1/s]."""
+def defect_of(system: ExactSystem, metric: Metric, piece: Piece, p: Sequence[Balls]) -> float:
+    """sup ‖F(p, w) − p'‖_S [1/s] of polynomials p in τ on the piece."""
     h = arb(piece.duration)
 
     def defect(y: Sequence[Any], w: Sequence[Any], sin: Any, cos: Any) -> list[Any]:
         return [rate - yi.derivative() * 2 / h for rate, yi in zip(system.equations(y, w, sin, cos), y, strict=True)]
 
-    rows = _series(system, piece, defect, both(piece))
+    rows = _series(system, piece, defect, p)
     return _sup_length(metric, [c for row in rows for c in row], len(rows[0]))
 
 
@@ -236,16 +241,26 @@ def _sup_length(metric: Metric, entries: Sequence[Any], terms: int) -> float:
     return metric.longest(np.array([above(sum(map(abs, row), arb(0))) for row in rows]))
 
 
-def _closed(system: ExactSystem, metric: Metric, piece: Piece, V: float, defect: float) -> tuple[float, float]:
-    """V at the end, and the L that holds on a tube wide enough for V to stay in it."""
+def over(system: ExactSystem, piece: Piece) -> list[Any]:
+    """Balls around w over the whole piece."""
+    return list(system.inputs_over(piece.begin, piece.end)(arb(piece.begin) + arb(piece.duration) * WHOLE))
+
+
+def closed(
+    system: ExactSystem, metric: Metric, piece: Piece, V: float, defect: float, excess: Excess, rate: float
+) -> tuple[float, float]:
+    """V at the end, and L ≥ ‖∂F/∂x − A‖_S on a tube wide enough for V to stay in it.
+
+    excess : ∂F/∂x − A over the balls x and w.  rate : A's logarithmic norm.
+    """
     ranges = [arb_poly(c)(arb(0, 1)) for c in _centred(both(piece), MIDDLE, 0)]
-    w = system.inputs_over(piece.begin, piece.end)(arb(piece.begin) + arb(piece.duration) * WHOLE)
+    w = over(system, piece)
     most = 2.0 * (V + defect * above(arb(piece.duration)))
     for _ in range(TRIES):
         box = [r + arb(0, n * most) for r, n in zip(ranges, metric.reach.tolist(), strict=True)]
         try:
-            L = metric.size(jacobian(system, box, w) - metric.A)
-            after = _grown(V, L - metric.alpha, defect, piece)
+            L = metric.size(excess(box, w))
+            after = grown(V, L + rate, defect, piece)
         except NotProvedError:  # wider than numbers go
             break
         if max(V, after) <= most:

@@ -7,6 +7,7 @@ the car is x' = F(x, w) with u = K x: A − B_u K in the standard form. Both cer
 from __future__ import annotations
 
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -15,8 +16,9 @@ from fmu_src.controller.design import design
 from fmu_src.controller.hardware import Hardware
 from fmu_src.controller.law import control_parameters
 
-from ..bertolino_baksa.balls import NotProvedError
+from ..bertolino_baksa.balls import NotProvedError, precision
 from ..bertolino_baksa.certificate import Certificate, to_json
+from ..bertolino_baksa.norms import Norm
 from ..bertolino_baksa.proof import Proof
 from ..errors import InputError
 from ..files import write_whole
@@ -25,6 +27,8 @@ from ..reference import Parameters
 from ..stabilization.full_car import strut_gain
 from .car_certificates import certify_car
 from .certificate_command import statement
+from .directed import at_least, at_most
+from .finite_horizon import finite_horizon, largest_delta
 
 SHARES = (0.01, 0.1, 0.5)  # of the smaller largest ε, at which δ is compared
 
@@ -67,10 +71,36 @@ def command(parameters: Parameters, where: Path | None) -> int:
     for title, lines in zip(("without control", "with control for all t >= 0"), said, strict=True):
         print("\n".join([f"{title}:", *lines]))
     print("\n".join(["what control changes, each norm the same for both:", *comparison(passive[0], closed[0])]))
+    for line in on_horizon(parameters, [claim.norm for claim in passive[0].claims]):
+        print(line)
     if where is not None:
         write_whole(where, to_json(closed[0]))
         print(f"{where}: written")
     return 0
+
+
+def on_horizon(parameters: Parameters, norms: Sequence[Norm]) -> list[str]:
+    """l and the largest δ with the controller's gain by time on its horizon, against no control by the same method."""
+    control = control_parameters(parameters)
+    if control.horizon != "finite":
+        return ["the controller has no finite horizon: nothing is said of a gain that changes in time"]
+    try:
+        passive, controlled = finite_horizon(parameters)
+    except NotProvedError as error:
+        return [f"no certificate with the gain by time on its horizon: {error}"]
+    lines = [
+        f"with the gain by time from {control.begin:g} to {control.end:g} s and no control after, for all t >= 0 "
+        "(delta by tubes alone, with control and without: less than is proved above):"
+    ]
+    for norm in norms:
+        with precision(2):
+            before, after = (found.epsilon(norm, 0.0) for found in (passive, controlled))
+            least, most = (largest_delta(found, norm) for found in (passive, controlled))
+        lines.append(
+            f"  {norm.name} norm: l <= {at_most(after, 6)}, times {after / before:.6g}; delta up to {at_least(most)}, "
+            f"without control {at_least(least)}"
+        )
+    return lines
 
 
 def comparison(passive: Certificate, closed: Certificate) -> list[str]:
