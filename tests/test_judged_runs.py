@@ -123,3 +123,24 @@ def test_the_findings_of_a_file_lie_beside_it_as_those_of_a_run(bump: Run, tmp_p
         check_file(exported(run, tmp_path / "a.csv"))
         found = read_findings(tmp_path / "a.findings.json")
         assert found and [f.holds for f in found] == [holds] * len(found)
+
+
+def test_a_file_of_a_controlled_run_without_its_forces_is_not_judged_at_all(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """It is no row of another motion that is wrong with it: nothing is known of the forces."""
+    path = exported(run_of("bump-lqr", stop_time=0.6), tmp_path / "a.csv")
+    assert check_file(path, "--parameters", "bump-lqr") == 1
+    said = capsys.readouterr().out
+    assert "the controller is on, but force_fl, force_fr, force_rl, force_rr are not recorded" in said
+    assert read_findings(tmp_path / "a.findings.json") == [] and "FAIL" not in said
+
+
+def test_what_is_said_between_the_rows_is_said_until_the_last_row(bump: Run) -> None:
+    """And which part of the tolerance is proved of the exact motion, which the run's own."""
+    *_, between = certified_findings(bump)[0]
+    last = f"until t = {bump.trajectory.time[-1]:g} s"
+    assert last in between.claim and last in between.source
+    assert "all t" not in between.claim + between.source
+    proved, own = (float(between.source.split(word)[1].split(",")[0]) for word in (" s: ", "tolerance, "))
+    assert between.tolerance == pytest.approx(proved + own, rel=1e-2) and own > 0.0

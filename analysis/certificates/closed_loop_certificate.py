@@ -27,6 +27,7 @@ from ..reference import Parameters
 from ..stabilization.full_car import strut_gain
 from .car_certificates import certify_car
 from .certificate_command import statement
+from .directed import at_least, at_most
 from .finite_horizon import finite_horizon, largest_delta
 
 SHARES = (0.01, 0.1, 0.5)  # of the smaller largest ε, at which δ is compared
@@ -96,8 +97,8 @@ def on_horizon(parameters: Parameters, norms: Sequence[Norm]) -> list[str]:
             before, after = (found.epsilon(norm, 0.0) for found in (passive, controlled))
             least, most = (largest_delta(found, norm) for found in (passive, controlled))
         lines.append(
-            f"  {norm.name} norm: l = {after:.6g}, times {after / before:.6g}; delta up to {most:.4g}, without control "
-            f"{least:.4g}"
+            f"  {norm.name} norm: l <= {at_most(after, 6)}, times {after / before:.6g}; delta up to {at_least(most)}, "
+            f"without control {at_least(least)}"
         )
     return lines
 

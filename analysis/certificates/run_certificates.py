@@ -24,6 +24,7 @@ from ..scenario import Scenario, read_scenario
 from ..trajectory import FINDINGS, Run
 from .authenticity import Export, KnownRoad, defect, profile, sampled
 from .car_certificates import metric_of
+from .directed import at_most
 from .exact_car import energy_norm, exact_system
 from .exported import BY_DEFAULT, SAMPLING, read_export
 from .falsification import Motions, Rows, judged, motions
@@ -90,7 +91,7 @@ def _on_its_road(run: Run, export: Export, file: str) -> tuple[list[Finding], st
     expected, e, off = found.at(t)
     rows = judged(export.x, expected, off + export.digits + export.own * scales(expected), e)
     bound = found.largest_error(energy_norm(car_of(parameters)))
-    return [*findings, _of_rows(export, rows, file), _between_rows(run, rows, bound, "this road")], ""
+    return [*findings, _of_rows(export, rows, file), _between_rows(run, export, rows, bound, "this road")], ""
 
 
 def _on_roads(
@@ -105,7 +106,7 @@ def _on_roads(
         return findings, str(error)
     rows = everywhere.rows(export.x, allowed)
     bound = everywhere.found.largest_error(energy_norm(car_of(run.parameters)))
-    between = _between_rows(run, rows, bound, f"every road of class {roads} on which a motion has these rows")
+    between = _between_rows(run, export, rows, bound, f"every road of class {roads} on which a motion has these rows")
     return [*findings, _of_rows(export, rows, file), between], ""
 
 
@@ -193,18 +194,19 @@ def _of_rows(export: Export, rows: Rows, file: str) -> Finding:
     )
 
 
-def _between_rows(run: Run, rows: Rows, bound: float, road: str) -> Finding:
+def _between_rows(run: Run, export: Export, rows: Rows, bound: float, road: str) -> Finding:
     """The bound is of the exact motion; the run's own error comes on top of it at its rows."""
     norm = energy_norm(car_of(run.parameters))
-    seen = float(norm(rows.e.T).max())
+    seen, last = float(norm(rows.e.T).max()), export.times[-1]
     own = float(np.linalg.norm(np.abs(norm.T) @ rows.allowed.max(axis=0)))
     return Finding(
-        claim="the run stays as near x_lin as is proved of its motion at all times, between the rows too: largest "
-        "N(x - x_lin) at a row, N the energy norm",
+        claim=f"until t = {last:g} s the run is as near x_lin as is proved of its motion, between the rows too: "
+        "largest N(x - x_lin) at a row, N the energy norm, to which the run's own error may add",
         equation="(2.3), definition 2.1",
         measured=float(norm((rows.off + rows.e).T).max()),
         expected=0.0,
         tolerance=bound + own,
         unit="J^0.5",
-        source=f"proved on {road} for all t: {bound:.6g}, of which the motion reaches {seen:.6g} at the rows",
+        source=f"proved on {road} of the exact motion until t = {last:g} s: {at_most(bound, 6)}, of which it reaches "
+        f"{seen:.6g} at the rows; the rest of the tolerance, {own:.2g}, is the run's integrator and printed digits",
     )
