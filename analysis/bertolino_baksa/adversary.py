@@ -88,7 +88,7 @@ def worst(
     The first starts are those that the linear part carries furthest from e on, at many times. From the worst of them
     on, the full equations are linearised around their own motion, whose furthest start is the next.
     """
-    inverse = np.linalg.inv(norm.T)
+    inverse = np.asarray(np.linalg.inv(norm.T), dtype=float)
     crowd = _furthest(form, norm, delta, *_errors(form, signal, x0, stop), CANDIDATES)
     best, at = 0.0, crowd[:, 0]
     for _ in range(rounds + 1):
@@ -154,7 +154,7 @@ def _errors(form: StandardForm, signal: Signal, x0: Array, stop: float) -> tuple
 
 def _furthest(form: StandardForm, norm: Norm, delta: float, times: Array, e: Array, count: int) -> Array:
     """Starts (n, count) with N = delta for which N(e + e^(At) y) is largest at the times when it is largest."""
-    inverse = np.linalg.inv(norm.T)
+    inverse = np.asarray(np.linalg.inv(norm.T), dtype=float)
     carried = norm.T @ expm((times - times[0])[:, None, None] * form.A) @ inverse
     z, sizes = _directions(norm, (norm.T @ e).T, carried, delta)
     order = np.argsort(sizes)[::-1][: SPREAD * count]

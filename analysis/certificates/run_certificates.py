@@ -142,7 +142,7 @@ def judge_export(path: Path, road_class: str | None, scenario: str | None) -> in
     run, rounding = read_export(path, _as_exported(scenario or DEFAULT))
     findings, reason = certified_findings(run, rounding, str(path), roads)
     if reason:
-        print(f"not all is proved: {reason}")
+        print(f"{'not all' if findings else 'nothing'} is proved: {reason}")
     for finding in findings:
         print(finding.line)
     write_findings(findings, path.with_suffix(f".{FINDINGS}"))
