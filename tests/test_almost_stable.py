@@ -14,10 +14,12 @@ from flint import arb, arb_series, ctx, fmpq
 
 from analysis.bertolino_baksa.adversary import excursions, reference_floor
 from analysis.bertolino_baksa.balls import ExactSystem, NotProvedError, above, decimal, length, precision, two_norm
+from analysis.bertolino_baksa.bounded_inputs import Bounds, gains
 from analysis.bertolino_baksa.certificate import Certificate, certify, from_json, to_json, verify
-from analysis.bertolino_baksa.majorant import majorant
-from analysis.bertolino_baksa.norms import Norm, euclid, modal_metric, weighted_sup
+from analysis.bertolino_baksa.majorant import SECANT, majorant
+from analysis.bertolino_baksa.norms import Norm, euclid, modal_metric, proved_metric, weighted_sup
 from analysis.bertolino_baksa.proof import Proof
+from analysis.bertolino_baksa.quick import quick_floors
 from analysis.errors import InputError
 from analysis.methods.signals import Signal, constant, harmonic
 from analysis.methods.standard_form import StandardForm, standard_form
@@ -84,6 +86,18 @@ def test_the_traps_of_ball_arithmetic_are_closed() -> None:
     np.testing.assert_allclose(two_norm(m), exact, rtol=1e-10)
 
 
+def test_a_bound_of_a_norm_does_not_trust_its_eigenvectors(monkeypatch: pytest.MonkeyPatch) -> None:
+    m, eigh = np.random.default_rng(3).normal(size=(4, 4)), np.linalg.eigh
+    exact = np.linalg.norm(m, 2)
+    for wrong, worst in ((1e-5, 1.0 + 1e-4), (0.1, None), (np.nan, None)):
+        monkeypatch.setattr(np.linalg, "eigh", lambda a, wrong=wrong: (eigh(a)[0], eigh(a)[1] * (1.0 - wrong)))
+        if worst:
+            assert exact <= two_norm(m) <= worst * exact
+        else:
+            with pytest.raises(NotProvedError, match="orthogonal"):
+                two_norm(m)
+
+
 @pytest.mark.parametrize("equations", [duffing, pendulum])
 def test_the_majorant_is_one_and_it_is_close(equations: Equations) -> None:
     """R(x + y) − R(x) never changes by more than it says, at random points; but the worst comes near."""
@@ -147,9 +161,71 @@ def test_van_der_pols_origin_has_no_certificate_and_says_why() -> None:
         certified(van_der_pol, 2)
 
 
+def test_units_in_which_squares_of_floats_vanish_are_refused() -> None:
+    """With S · 1e80 and T · 1e-84 every |T S⁻¹|² would be 0, and so every bound of a norm."""
+    certificate, proof, _, _ = certified(duffing, 2)
+    norm, made = certificate.claims[0].norm, build(duffing, 2, quiet, fmpq(0))
+    for scale in (1e-84, 1e84, 0.0):
+        with pytest.raises(NotProvedError, match=r"singular|largest entry"), precision(2):
+            proof.epsilon(dataclasses.replace(norm, T=norm.T * scale), np.array([scale]))
+        with pytest.raises(NotProvedError, match=r"singular|largest entry"):
+            verify(dataclasses.replace(certificate, S=certificate.S * scale), made)
+    verify(dataclasses.replace(certificate, S=certificate.S * 1e20), made)
+    with precision(2):  # starts whose squares vanish are not proved to stay at rest
+        assert (proof.epsilon(norm, np.array([0.0, 1e-200])) > 1e-100).all()
+
+
 def test_a_motion_that_runs_away_has_no_certificate() -> None:
     with pytest.raises(NotProvedError):
         certified(cubic, 1, x0=[2.01])
+
+
+def test_a_system_that_does_not_rest_without_input_is_refused() -> None:
+    """x' = −x + (cos x − 1)/128 + w rests; without the 1 it does not, and l would be too small by as much."""
+
+    def pushed(x: Any, w: Any, sine: Any, cosine: Any) -> list[Any]:
+        return [x[0] * -1.0 + cosine(x[0]) * (arb(1) / 128) + w[0]]
+
+    def resting(x: Any, w: Any, sine: Any, cosine: Any) -> list[Any]:
+        return [pushed(x, w, sine, cosine)[0] - arb(1) / 128]
+
+    none, one = [fmpq(5)], np.eye(1)
+    certify({}, build(resting, 1, quiet, fmpq(0)), one, lambda x: (euclid(1),), none, np.zeros(1))
+    made = build(pushed, 1, quiet, fmpq(0))
+    with pytest.raises(NotProvedError, match="row 0 of F"):
+        certify({}, made, one, lambda x: (euclid(1),), none, np.zeros(1))
+    with precision(2):
+        metric = proved_metric(made({}), one)
+        with pytest.raises(NotProvedError, match="row 0 of F"):
+            quick_floors(made({}), metric, [euclid(1)], [0.0], fmpq(5))
+        with pytest.raises(NotProvedError, match="row 0 of F"):
+            gains(made({}), metric).under(Bounds(np.zeros(1))).motion(np.zeros(1))
+
+
+def test_the_majorant_ends_before_a_pole() -> None:
+    """x₁⁷/(1 − x₁²)² has a pole at 1; its majorant, where |2x² − x⁴| may reach 1: at x² = √2 − 1."""
+
+    def pole(x: Any, w: Any, sine: Any, cosine: Any) -> list[Any]:
+        square = x[0] * x[0]
+        left = 1.0 - square
+        return [x[0] * -1.0, square * square * square * x[0] * (arb(1) / 20) / (left * left) - x[1] + w[0]]
+
+    made, end = build(pole, 2, quiet, fmpq(0)), np.sqrt(np.sqrt(2.0) - 1.0)
+    with precision(2):
+        good = majorant(made({}), np.array([0.99 * end / (1.0 + SECANT), 1.0, 1.0]))
+        assert np.isfinite(good.slope).all()
+        for size in (0.99 * end, 1.2, 3.0):  # a secant beyond 0.99 end reaches over it
+            with pytest.raises(NotProvedError, match="divisor"):
+                majorant(made({}), np.array([size, 1.0, 1.0]))
+    certificate, _ = certify({}, made, np.eye(2), lambda x: (Norm("sup", np.eye(2), True),), [fmpq(7)], np.zeros(2))
+    assert certificate.claims[0].largest_delta < end
+
+
+def test_an_input_that_is_not_over_is_not_taken_for_none() -> None:
+    form = standard_form(duffing, ["x", "v"], 1)
+    endless = build(duffing, 2, swinging, fmpq(0))
+    with pytest.raises(NotProvedError, match="not proved to be flat"):
+        certify({}, endless, modal_metric(form.A, np.eye(2)), lambda x: (euclid(2),), [fmpq(30)], np.zeros(2))
 
 
 def test_a_claimed_period_that_is_none_is_refused() -> None:

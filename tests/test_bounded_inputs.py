@@ -144,7 +144,7 @@ def test_a_certificate_of_all_inputs_is_read_back_and_proved_and_more_is_not() -
         with pytest.raises(NotProvedError):
             verify(wrong, tied)
     with pytest.raises(InputError, match="altered"):
-        opened(to_json(made).replace(b"0.3", b"0.4"), "here", certificate_of)
+        opened(to_json(made).replace(b'"tied": true', b'"tied": false'), "here", certificate_of)
 
 
 def test_every_road_under_the_car() -> None:

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from flint import fmpq
+from flint import arb, fmpq
 
 from analysis.bertolino_baksa.adversary import excursions, reference_floor, worst
 from analysis.bertolino_baksa.balls import NotProvedError, precision
@@ -158,6 +158,25 @@ def test_a_piece_across_a_corner_of_the_road_is_rejected() -> None:
         with pytest.raises(NotProvedError, match="across a corner"):
             prove_linear(road, metric, halves)
         assert prove_linear(road, metric, halves[:1])[0] < 1e-20
+
+
+@pytest.mark.parametrize(
+    "road",
+    [
+        {"A": 0.5, "t_start": 1e6},
+        {"A": 0.5, "tau0": 2e6, "excite_fl": False, "excite_rl": False, "excite_rr": False},
+        {"v0": 2.5e-6, "excite_fl": False, "excite_fr": False},
+        {"profile": "sine", "t_start": 1e6},
+        {"A": 0.2, "v0": 2e-7, "Lambda": 1.0},
+    ],
+)
+def test_a_road_that_comes_late_or_lasts_long_is_no_flat_one(road: dict[str, Any]) -> None:
+    with precision(2):
+        pieces = build(model_of(road)).pieces
+    assert float(pieces[-1][0]) >= 1e6
+    assert any(w != 0 for begin, inputs in pieces for w in inputs(arb(begin)))
+    with pytest.raises(NotProvedError, match="pieces reach 1250 s at most"):
+        certify_car(road)
 
 
 def test_too_large_a_bump_has_no_certificate_and_says_where_it_fails() -> None:

@@ -14,8 +14,8 @@ import pytest
 from made_up_run import made_up_run
 from matplotlib.figure import Figure
 
-from analysis.__main__ import main
-from analysis.bertolino_baksa.adversary import _vertices, motions
+from analysis.__main__ import _certify_shortly, main
+from analysis.bertolino_baksa.adversary import _furthest, motions
 from analysis.bertolino_baksa.certificate import Certificate, to_json
 from analysis.bertolino_baksa.funnel import ends, funnel
 from analysis.bertolino_baksa.proof import Proof
@@ -33,11 +33,11 @@ from analysis.certificates.certificate_figures import (
 )
 from analysis.cosimulation import simulate
 from analysis.errors import InputError
-from analysis.figures import described
+from analysis.figures import described, readable
 from analysis.methods.linear_response import linear_response
 from analysis.reference import car_of, road_parameters
 from analysis.scenario import read_scenario
-from analysis.trajectory import Run, write_run
+from analysis.trajectory import Run, read_run, write_run
 from fmu_src.quantities import STATES
 
 NAMES = [q.name for q in STATES]
@@ -88,7 +88,9 @@ def test_motions_from_within_delta_stay_in_the_funnel_which_is_not_much_wider(ma
     delta = float(table[len(table) // 2, 1])
     size, bound = funnel(proof, norm, delta)
     form, signal = car_form(car_of({})), road_signal(road_parameters({}))
-    off = np.concatenate([_vertices(form, norm, 0.5)[:, ::6], rng.normal(size=(14, 20))], axis=1)
+    grid = np.linspace(0.0, 0.5, 251)
+    far = _furthest(form, norm, delta, grid, np.zeros((14, len(grid))), 20)
+    off = np.concatenate([far, rng.normal(size=(14, 20))], axis=1)
     times, x = zip(*motions(form, signal, off * delta / norm(off), 0.5, step=2.5e-4), strict=True)
     x_lin = linear_response(form.A, form.B, np.zeros(14), signal, np.array(times))
     cell = np.searchsorted(ends(proof), times, side="right") - 1
@@ -218,11 +220,22 @@ def test_a_certificate_of_another_car_or_road_is_refused(
 
 
 @pytest.mark.usefixtures("at_hand")
-def test_certify_draws_delta_beside_the_certificate(tmp_path: Path) -> None:
+def test_certify_draws_delta_beside_the_certificate(made: Made, tmp_path: Path) -> None:
     assert main(["certify", "bump", "-o", str(tmp_path / "c.json")]) == 0
     title, caption = described((tmp_path / "c.svg").read_bytes(), "c.svg")
-    assert "how far" in title and "δ_max = 16.72" in caption
+    assert "how far" in title and f"δ_max = {readable(made[0].claims[0].largest_delta)}" in caption
     assert main(["certify", "bump", "-o", str(tmp_path / "c.svg")]) == 2
+
+
+@pytest.mark.usefixtures("at_hand")
+def test_a_run_is_certified_on_the_way_if_its_road_ends(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    endless = made_up_run()
+    endless.record["parameters"]["road"]["profile"] = "sine"
+    for run, said in ((endless, "the road has no end"), (made_up_run(enabled=True), "the actuators act")):
+        _certify_shortly(run, folder)
+        assert said in capsys.readouterr().err and not (folder / "certificate.json").exists()
+    _certify_shortly(read_run(folder), folder)
+    assert (folder / "certificate.json").is_file()
 
 
 def test_runs_of_which_the_certificate_says_nothing_have_a_reason(

@@ -14,9 +14,14 @@ from exported_runs import NAMES, STOP, halved, run_of, shifted, tampered
 
 from analysis.__main__ import main
 from analysis.bertolino_baksa.balls import NotProvedError
+from analysis.car import car_form, road_signal
 from analysis.certificates.exact_car import energy_norm
-from analysis.certificates.exported import _rounding
+from analysis.certificates.exported import _late, _rounding, read_export
+from analysis.certificates.printed_times import input_within, moved, steepest
 from analysis.certificates.run_certificates import _motions, certified_findings
+from analysis.certificates.unknown_roads import road_class
+from analysis.errors import InputError
+from analysis.reference import road_parameters
 from analysis.scenario import built_in_scenarios, read_scenario
 from analysis.trajectory import Run, write_csv
 from fmu_src.vehicle.parameters import Car
@@ -54,6 +59,15 @@ def test_what_is_proved_between_the_rows_is_sharp(bump: Run) -> None:
     found, norm = _motions(bump, t, x[0], np.zeros(14)), energy_norm(Car())
     _, e, _ = found.at(np.linspace(0.0, STOP, 6001))
     assert 1.0 <= found.largest_error(norm) / norm(e.T).max() < 1.01
+
+
+@pytest.mark.parametrize("roads", [None, "curv:45", "lip:0.72"])
+def test_neither_is_one_in_which_states_rest(roads: str | None) -> None:
+    """Both sides meet the bump at once: nothing rolls, though on other roads of the class it might."""
+    run = run_of("bump", parameters={"tau0": 0.0})
+    assert not np.any(run.trajectory["body.roll"])
+    findings, reason = certified_findings(run, roads=road_class(roads) if roads else None)
+    assert reason == "" and all(finding.holds for finding in findings)
 
 
 # ---------------------------------------------------------------------------------------------------- tampered runs
@@ -192,6 +206,50 @@ def test_the_digits_that_a_column_prints_are_seen() -> None:
     np.testing.assert_allclose(_rounding(["1.2345", "0.0301", "0"]), [0.5e-4, 0.5e-4, 0.5e-4])
     np.testing.assert_allclose(_rounding(["1.234e+02", "5.301e-05"]), [0.05, 0.5e-8])
     assert _rounding(["0.0", "0"]).tolist() == [0.0, 0.0]
+
+
+def test_times_printed_to_a_few_digits_falsify_no_motion(
+    bump: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Rows of the exact motion at k/300 s, their times printed to 1e-5 s."""
+    monkeypatch.setattr("analysis.certificates.run_certificates.own_error", lambda run: 1e-9)
+    t = np.arange(100) / 300.0
+    x = _motions(bump, t, np.zeros(14), np.zeros(14)).at(t)[0]
+    for change, holds in ((0.0, True), (2e-4, False)):
+        path = tmp_path / "a.csv"
+        x[60:, NAMES.index("axle_r.roll")] += change
+        lines = [
+            ",".join(["time", *NAMES]),
+            *(f"{s:.5f}," + ",".join(map(repr, r)) for s, r in zip(t, x.tolist(), strict=True)),
+        ]
+        path.write_text("\n".join(lines))
+        run, rounding = read_export(path, read_scenario("bump"))
+        findings, reason = certified_findings(run, rounding)
+        assert reason == "" and all(finding.holds for finding in findings) is holds
+        exact, _ = certified_findings(run, {**rounding, "time": np.zeros(len(t))})
+        assert not exact[1].holds
+
+
+def test_how_far_a_motion_gets_in_a_little_time_is_bounded_and_nearly_so(bump: Run) -> None:
+    """At rows between corners and at them, against the exact motion within that time."""
+    form, late = car_form(Car(), order=1), np.full(120, 5e-5)
+    t = np.linspace(1e-3, 0.4, 120).round(3)
+    motion = _motions(bump, np.array([0.0, STOP]), np.zeros(14), np.zeros(14))
+    x, signal = motion.at(t)[0], road_signal(road_parameters(bump.parameters))
+    bound = moved(form, x, np.zeros_like(x), late, *input_within(signal, t, late))
+    far = np.max([np.abs(motion.at(t + s)[0] - x) for s in np.linspace(-5e-5, 5e-5, 5)], axis=0)
+    assert (far <= bound).all()
+    assert 1.0 <= np.median(bound.max(axis=0) / far.max(axis=0)) < 1.5
+    with pytest.raises(InputError, match="too coarse for this car"):
+        moved(form, x, x, 1e3 * late, np.zeros((120, 8)), np.zeros((120, 8)))
+
+
+def test_times_that_rise_by_one_step_are_exact() -> None:
+    assert not _late(["0.0", "0.01", "0.02", "0.03", "0.035"]).any()
+    np.testing.assert_allclose(_late(["0.00000", "0.00333", "0.00667", "0.01000", "0.01333"]), 0.5e-5)
+    assert (_late(["0.0", "0.1", "0.2", "0.30000000000000004"]) <= 0.5e-16).all()
+    with pytest.raises(InputError, match="column 'time'"):
+        steepest(np.array([0.0, 0.1, 0.15]), np.full(3, 0.05), np.zeros((3, 4)), np.zeros((3, 4)), 1.0, curved=True)
 
 
 def test_the_run_command_writes_what_is_proved(bump: Run, tmp_path: Path) -> None:

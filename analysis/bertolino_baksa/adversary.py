@@ -20,9 +20,13 @@ from .norms import Norm
 STEP = 5e-4  # s, at most
 SAMPLING = 5e-4  # s, of the true floor
 CANDIDATES = 64  # starts that the linear part proposes
-ROUNDS = 6  # of local search around the worst of them
-CROWD = 48  # starts of a round
-FEW = 8  # candidates are skipped for a picture: the best have neighbours nearly as good
+SPREAD = 8  # times as many are in the running: the best have neighbours nearly as good
+FEW = 12  # of them for a picture
+HORIZON, INSTANTS = 1.0, 400  # s, and number, of the times at which the linear part is asked
+ASCENTS = 60  # of a start on the sphere, at one time
+ROUNDS = 4  # of linearising around the worst motion
+DIFFERENCE = 1e-6  # of delta, for that
+PEAKS = 6  # of that motion, each of which is pushed further
 
 
 def motions(
@@ -82,19 +86,47 @@ def worst(
 ) -> tuple[float, Array]:
     """A large sup N(x − x_lin) over the starts with N(x(0) − x0) ≤ delta, and its start's offset (n,).
 
-    The first starts are those that the linear part carries furthest, at many times; then a search around the worst.
+    The first starts are those that the linear part carries furthest from e on, at many times. From the worst of them
+    on, the full equations are linearised around their own motion, whose furthest start is the next.
     """
-    rng = np.random.default_rng(0)
-    vertices = _vertices(form, norm, stop)
-    crowd = np.concatenate([vertices, -vertices], axis=1) * delta
+    inverse = np.linalg.inv(norm.T)
+    crowd = _furthest(form, norm, delta, *_errors(form, signal, x0, stop), CANDIDATES)
     best, at = 0.0, crowd[:, 0]
-    for k in range(rounds + 1):
-        reached = excursions(form, signal, [norm], x0, crowd, stop)[0]
-        if reached.max() > best:
-            best, at = float(reached.max()), crowd[:, int(np.argmax(reached))]
-        near = at[:, None] + delta * 0.5**k * rng.normal(size=(len(x0), CROWD)) / norm(np.eye(len(x0)))[:, None] / 4.0
-        crowd = near * delta / norm(near)
+    for _ in range(rounds + 1):
+        _, off = _offsets(form, signal, x0, crowd, stop)
+        sizes = norm(off)  # (times, K)
+        if not sizes.max() > best:
+            break
+        _, k = np.unravel_index(np.argmax(sizes), sizes.shape)
+        best, at = float(sizes.max()), crowd[:, k]
+        if rounds:
+            crowd = _from_its_own_motion(form, signal, norm, x0, at, delta, stop, inverse)
     return best, at
+
+
+def _from_its_own_motion(
+    form: StandardForm, signal: Signal, norm: Norm, x0: Array, at: Array, delta: float, stop: float, inverse: Array
+) -> Array:
+    """Starts (n, few) furthest by the equations' own derivatives along the motion from x0 + at, near its worst time."""
+    small = DIFFERENCE * delta
+    times, off = _offsets(form, signal, x0, at[:, None] + np.hstack([np.zeros((len(at), 1)), small * inverse]), stop)
+    sizes = norm(off[:, :, 0])
+    top = [i for i in range(len(times)) if sizes[i] == sizes[max(i - 1, 0) : i + 2].max()]  # the peaks
+    peaks = sorted(top, key=lambda i: -sizes[i])[:PEAKS]
+    M = np.stack([norm.T @ (off[:, i, 1:] - off[:, i, :1]) / small for i in peaks])
+    e = np.stack([norm.T @ off[:, i, 0] for i in peaks]) - M @ (norm.T @ at)
+    z, _ = _directions(norm, e, M, delta)
+    starts = inverse @ z.T
+    return starts * delta / norm(starts)
+
+
+def _offsets(
+    form: StandardForm, signal: Signal, x0: Array, off: Array, stop: float, step: float = STEP
+) -> tuple[Array, Array]:
+    """Times (N,) and x − x_lin (n, N, K) of the motions from x0 + off (n, K), x_lin from x0."""
+    times, x = zip(*motions(form, signal, x0[:, None] + off, stop, step), strict=True)
+    x_lin = linear_response(form.A, form.B, x0, signal, np.array(times))
+    return np.array(times), np.stack(x, axis=1) - x_lin[:, :, None]
 
 
 def reached(
@@ -102,31 +134,48 @@ def reached(
 ) -> list[Array]:
     """For each norm, sup N(x − x_lin) (K,) up to `stop` [s] over starts at N(x(0) − x0) = its deltas (K,).
 
-    Every FEW-th of the first starts of `worst`, without its search and all in one integration: for a picture.
+    By FEW first starts like those of `worst`, without its rounds and all in one integration: for a picture.
     """
-    crowds = []
-    for norm, delta in zip(norms, deltas, strict=True):
-        vertices = _vertices(form, norm, stop)[:, ::FEW]
-        both = np.concatenate([vertices, -vertices], axis=1)
-        crowds.append((both[:, None, :] * delta[:, None]).reshape(len(x0), -1))
+    errors = _errors(form, signal, x0, stop)
+    crowds = [
+        np.stack([_furthest(form, norm, d, *errors, FEW) for d in delta.tolist()], axis=1).reshape(len(x0), -1)
+        for norm, delta in zip(norms, deltas, strict=True)
+    ]
     found = excursions(form, signal, norms, x0, np.concatenate(crowds, axis=1), stop)
     own = np.split(found, np.cumsum([crowd.shape[1] for crowd in crowds])[:-1], axis=1)
     return [own[i][i].reshape(len(delta), -1).max(axis=1) for i, delta in enumerate(deltas)]
 
 
-def _vertices(form: StandardForm, norm: Norm, stop: float) -> Array:
-    """Starts (n, ≤ CANDIDATES) with N = 1 that e^(At) carries furthest at the times when it carries furthest."""
+def _errors(form: StandardForm, signal: Signal, x0: Array, stop: float) -> tuple[Array, Array]:
+    """Times (N,) [s] and e (n, N) of the motion from x0 itself, at INSTANTS even times or so."""
+    times, e = _offsets(form, signal, x0, np.zeros((len(x0), 1)), min(stop, HORIZON))
+    few = slice(None, None, max(1, len(times) // INSTANTS))
+    return times[few], e[:, few, 0]
+
+
+def _furthest(form: StandardForm, norm: Norm, delta: float, times: Array, e: Array, count: int) -> Array:
+    """Starts (n, count) with N = delta for which N(e + e^(At) y) is largest at the times when it is largest."""
     inverse = np.linalg.inv(norm.T)
-    times = np.linspace(0.0, min(stop, 1.0), 400)
-    carried = norm.T @ expm(times[:, None, None] * form.A) @ inverse
-    if norm.largest:  # the furthest corner of the box for each row
-        sizes = np.abs(carried).sum(axis=2)
-        order = np.argsort(sizes, axis=None)[::-1][: 8 * CANDIDATES]
-        corners = np.array([np.sign(carried.reshape(-1, carried.shape[2])[i]) for i in order])
-    else:
-        _, sizes, right = np.linalg.svd(carried)
-        order = np.argsort(sizes[:, 0])[::-1][: 8 * CANDIDATES]
-        corners = right[order, 0, :]
-    chosen = corners[:: max(1, len(corners) // CANDIDATES)][:CANDIDATES]
-    starts = inverse @ chosen.T
-    return starts / norm(starts)
+    carried = norm.T @ expm((times - times[0])[:, None, None] * form.A) @ inverse
+    z, sizes = _directions(norm, (norm.T @ e).T, carried, delta)
+    order = np.argsort(sizes)[::-1][: SPREAD * count]
+    starts = inverse @ z[order[:: max(1, len(order) // count)][:count]].T
+    return np.asarray(starts * delta / norm(starts))
+
+
+def _directions(norm: Norm, e: Array, M: Array, delta: float) -> tuple[Array, Array]:
+    """z (L, n) that make N(e + M z) large, at each of e (N, n) and M (N, n, n), T left out, and how large it is (L,).
+
+    Where the norm is a maximum, the furthest corner for each row and sign; else ascents from the singular vectors.
+    """
+    if norm.largest:
+        z = delta * np.concatenate([np.sign(M), -np.sign(M)], axis=1)
+        sizes = np.concatenate([e, -e], axis=1) + delta * np.tile(np.abs(M).sum(axis=2), 2)
+        return z.reshape(-1, M.shape[2]), sizes.ravel()
+    first = np.linalg.svd(M)[2][:, :2]
+    z = delta * np.concatenate([first, -first], axis=1)  # (N, 4, n)
+    for _ in range(ASCENTS):  # the size rises at every step, as it is convex
+        z = (e[:, None, :] + z @ M.swapaxes(1, 2)) @ M
+        z *= delta / np.sqrt((z**2).sum(axis=2))[:, :, None]
+    sizes = np.sqrt(((e[:, None, :] + z @ M.swapaxes(1, 2)) ** 2).sum(axis=2))
+    return z.reshape(-1, M.shape[2]), sizes.ravel()

@@ -57,6 +57,14 @@ class ExactSystem:
         return self.inputs_at(begin)
 
 
+def refuse_unrest(system: ExactSystem) -> None:
+    """Raise NotProvedError unless F(0, 0) = 0 exactly, as bounds of F(x, w) − A x − B w from its terms in x, w need."""
+    rates = system.equations([arb(0)] * system.n, [arb(0)] * system.m, sine, cosine)
+    for i, rate in enumerate(rates):
+        if not arb(rate) == 0:
+            raise NotProvedError(f"row {i} of F(0, 0) is {rate}; wanted exactly 0, a system that rests without input")
+
+
 @contextmanager
 def precision(terms: int) -> Iterator[None]:
     """Work with BITS bits and series of this many terms."""
@@ -150,10 +158,19 @@ def jacobian(system: ExactSystem, x: Balls, w: Balls, *, inputs: bool = False) -
 def two_norm(m: Array) -> Array:
     """Upper bounds (…) of the spectral norms of float matrices (…, p, q) whose entries are exact.
 
-    With V orthogonal up to round-off, MᵀM is similar to VᵀMᵀMV, and Gershgorin's rows bound that. The products are
-    rounded: each entry by less than 1e-13 of the largest norm in the product, which the last factor covers.
+    With |VᵀV − 1| ≤ η, |M|² ≤ |VᵀMᵀMV|/(1 − η), and Gershgorin's rows bound both; V is nearly orthogonal. The products
+    are rounded: each entry by less than 1e-13 of the largest norm in the product, which 1e-11 covers. Raises
+    NotProvedError if V is not what it should be.
     """
     gram = np.swapaxes(m, -1, -2) @ m
     V = np.linalg.eigh(gram)[1]
-    rotated = np.swapaxes(V, -1, -2) @ gram @ V
-    return np.asarray(np.sqrt(np.abs(rotated).sum(axis=-1).max(axis=-1)) * (1.0 + 1e-11))
+    V_T = np.swapaxes(V, -1, -2)
+    off = _rows(V_T @ V - np.eye(V.shape[-1]))
+    if not np.all(off < 1e-3):
+        raise NotProvedError("no bound of a spectral norm: its eigenvectors are not orthogonal, or no numbers")
+    return np.asarray(np.sqrt(_rows(V_T @ gram @ V) / (1.0 - off)) * (1.0 + 1e-11))
+
+
+def _rows(m: Array) -> Array:
+    """Largest sums of sizes of rows of matrices (…, n, n)."""
+    return np.asarray(np.abs(m).sum(axis=-1).max(axis=-1))

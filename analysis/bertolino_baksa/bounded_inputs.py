@@ -22,7 +22,7 @@ from ..methods.standard_form import StandardForm
 from .balls import Array, ExactSystem, NotProvedError, matrix, rounded
 from .cells import CELLS, Decay, decay
 from .majorant import Majorant, majorant
-from .norms import Metric, Norm
+from .norms import Metric, Norm, usable_inverse
 from .slopes import largest_outputs
 from .tube import Piece, input_matrix
 
@@ -107,8 +107,9 @@ class Driven:
     def epsilon(self, norm: Norm, delta: Sequence[float]) -> list[float]:
         """ε for each δ: N(x(0)) ≤ δ and inputs within the bounds imply N(x(t)) ≤ ε for all t ≥ 0.
 
-        Raises NotProvedError if there is none for one of them.
+        Raises NotProvedError if there is none for one of them, or for a norm that floats cannot compute.
         """
+        usable_inverse(norm.T, f"matrix of the {norm.name} norm")
         gains = self.gains
         spread, kappa = gains.spread(norm), float(gains.decay.of(norm).max())
         driven = gains.driven(norm.T, self.bounds)

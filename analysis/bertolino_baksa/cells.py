@@ -6,12 +6,11 @@ bounds here are values at the cells' ends plus a term of second order in the cel
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from flint import arb, arb_mat
-from scipy.linalg import expm
 
 from .balls import Array, ExactSystem, above, magnitudes, matrix, rounded, two_norm
 from .norms import Metric, Norm
@@ -34,19 +33,24 @@ class Decay:
 
     def of(self, norm: Norm) -> Array:
         """κ (N,) ≥ sup N(e^(At) y)/N(y) over each cell."""
-        inverse, rest = rounded(matrix(norm.T).inv())
-        moved, curve = norm.T @ self.ends @ inverse, np.abs(norm.T) @ self.curve @ np.abs(inverse)
-        off = self._rounding(norm.T, inverse, rest)
+        moved, curve, off = self.turned(norm)
         sizes = np.abs(moved).sum(axis=2).max(axis=1) if norm.largest else two_norm(moved)
         bend = curve.sum(axis=2).max(axis=1) if norm.largest else np.sqrt((curve**2).sum(axis=(1, 2)))
         return (np.maximum(sizes[:-1], sizes[1:]) + bend) * (1 + EPS) + off
 
-    def rows(self, norm: Norm) -> Array:
-        """κ_j (N, n) ≥ sup |(e^(At) y)_j|/N(y) over each cell."""
+    def turned(self, norm: Norm) -> tuple[Array, Array, float]:
+        """T e^(At) T⁻¹ at the cells' ends (N + 1, n, n), how far (N, n, n) it may leave chords, and its rounding."""
         inverse, rest = rounded(matrix(norm.T).inv())
+        curve = np.abs(norm.T) @ self.curve @ np.abs(inverse)
+        return norm.T @ self.ends @ inverse, curve * (1 + EPS), self._rounding(norm.T, inverse, rest)
+
+    def rows(self, norm: Norm, left: Array | None = None) -> Array:
+        """κ_j (N, p) ≥ sup |(left e^(At) y)_j|/N(y) over each cell; left (p, n) is exact, 1 if not given."""
+        inverse, rest = rounded(matrix(norm.T).inv())
+        left = np.eye(len(norm.T)) if left is None else left
         dual = (lambda m: np.abs(m).sum(axis=2)) if norm.largest else (lambda m: np.sqrt((m**2).sum(axis=2)))
-        sizes, bend = dual(self.ends @ inverse), dual(self.curve @ np.abs(inverse))
-        off = self._rounding(np.eye(len(norm.T)), inverse, rest)
+        sizes, bend = dual(left @ self.ends @ inverse), dual(np.abs(left) @ self.curve @ np.abs(inverse))
+        off = self._rounding(left, inverse, rest)
         return (np.maximum(sizes[:-1], sizes[1:]) + bend) * (1 + EPS) + off
 
     def sizes(self, left: Array) -> Array:
@@ -93,7 +97,7 @@ def decay(metric: Metric, pieces: tuple[Piece, ...]) -> Decay:
     """
     A = metric.A
     now, ends, off, dropped = matrix(np.eye(A.nrows())), [np.eye(A.nrows())], 0.0, 0.0
-    A_size, S_size = np.abs(rounded(A)[0]), float(np.linalg.norm(metric.S)) * (1 + EPS)
+    S_size = float(np.linalg.norm(metric.S)) * (1 + EPS)
     steps: dict[tuple[int, int], arb_mat] = {}  # e^(AΔ) by Δ's numerator and denominator
     for p, count in zip(pieces, counts(pieces, metric), strict=True):
         width = p.duration / count
@@ -110,8 +114,9 @@ def decay(metric: Metric, pieces: tuple[Piece, ...]) -> Decay:
     off += float(np.linalg.norm(metric.reach)) * dropped * (1 + 1e-9)
     values, width = np.array(ends), widths(pieces, metric)
     distinct, where = np.unique(width, return_inverse=True)
-    spread = np.array([expm(A_size * w * (1 + EPS)) for w in distinct])[where]  # ≥ |e^(As)|, 0 ≤ s ≤ Δ
-    second = np.abs((rounded(A)[0] @ rounded(A)[0]) @ values[:-1])
+    A_size = arb_mat(A.nrows(), A.ncols(), [abs(v) for v in A.entries()])
+    spread = np.array([magnitudes((A_size * arb(w)).exp()) for w in distinct.tolist()])[where]  # ≥ |e^(As)|, 0 ≤ s ≤ Δ
+    second = np.abs(rounded(A * A)[0] @ values[:-1])
     second += 1e-9 * second.max()  # its rounding, with much to spare
     curve = (second @ spread) * (width**2 / 8)[:, None, None] * (1 + 1e-9)
     return Decay(width, values, curve, off)
@@ -150,14 +155,21 @@ def inputs(system: ExactSystem, metric: Metric, pieces: Sequence[Piece]) -> Arra
 def errors(tube: Tube, metric: Metric, norm: Norm) -> Array:
     """sup N(e) over each of the cells of `decay`, from finer ones in it."""
     found, c = [], metric.of(norm)
-    for piece, count, V in zip(tube.pieces, counts(tube.pieces, metric), tube.error, strict=True):
+    for values, bend, V in finely(tube, metric, norm):
+        sizes = np.abs(values).max(axis=1) if norm.largest else np.sqrt((values**2).sum(axis=1))
+        curved = bend.max() if norm.largest else np.sqrt((bend**2).sum())
+        found.append(sizes.max(axis=1) + curved + c * V)
+    return np.concatenate(found) * (1 + EPS)
+
+
+def finely(tube: Tube, metric: Metric, norm: Norm) -> Iterator[tuple[Array, Array, float]]:
+    """Of each piece: T p at finer cells' ends, p near e, by the cells of `decay` (cells, n, parts + 1); how far (n,) it
+    may leave the chords between; and V."""
+    for piece, count, V in zip(tube.pieces, counts(tube.pieces, metric), tube.error.tolist(), strict=True):
         sizes = np.abs(norm.T) @ np.abs(piece.error)
         values, bend = sampled(norm.T @ piece.error, FINE, sizes)
-        sizes = np.abs(values).max(axis=0) if norm.largest else np.sqrt((values**2).sum(axis=0))
-        curved = bend.max() if norm.largest else np.sqrt((bend**2).sum())
-        fine = np.maximum(sizes[:-1], sizes[1:]) + curved + c * V
-        found.append(fine.reshape(count, -1).max(axis=1))
-    return np.concatenate(found) * (1 + EPS)
+        at = np.arange(count)[:, None] * (FINE // count) + np.arange(FINE // count + 1)
+        yield values[:, at].swapaxes(0, 1), bend, V
 
 
 def sampled(coefficients: Array, cells: int, sizes: Array | None = None, begin: float = 0.0) -> tuple[Array, Array]:

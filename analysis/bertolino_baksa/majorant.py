@@ -15,7 +15,7 @@ from flint import arb, arb_series
 from numpy.typing import NDArray
 
 from ..methods.power_series import PowerSeries, cos, sin, variables
-from .balls import Array, ExactSystem, NotProvedError, above, coefficients, precision
+from .balls import Array, ExactSystem, NotProvedError, above, coefficients, precision, refuse_unrest
 
 ORDER = 5
 SECANT = 0.125  # of a box's side
@@ -52,6 +52,8 @@ class Sizes:
     def __truediv__(self, other: Any) -> Sizes:
         c, r = _parts(other)
         inverse = 1 / arb(c)
+        if not coefficients(r, 1)[0] * _size(inverse) < 1:
+            raise NotProvedError("a divisor may be 0 on the box, as far as the sizes of its terms say")
         bound = 1 / (1 - r * _size(inverse))  # 1/(c + r) = Σ (−r/c)ᵏ/c
         return self * Sizes(inverse, (bound - 1) * _size(inverse))
 
@@ -123,7 +125,11 @@ class Majorant:
 
 
 def majorant(system: ExactSystem, box: Array) -> Majorant:
-    """R̄ of the system, its tail bounded on |y_j| ≤ box_j (n + m,), all > 0."""
+    """R̄ of the system, its tail bounded on |y_j| ≤ box_j (n + m,), all > 0.
+
+    Raises NotProvedError where a divisor may be 0 on the box, or sine or cosine is not around 0; unless F(0, 0) = 0.
+    """
+    refuse_unrest(system)
     y = variables(system.n + system.m, ORDER, arb(1))
     rates = system.equations(y[: system.n], y[system.n :], sin, cos)
     rows = [rate.terms if isinstance(rate, PowerSeries) else {} for rate in rates]

@@ -11,6 +11,8 @@ from flint import arb, arb_mat
 from ..methods.modes import modes
 from .balls import Array, ExactSystem, NotProvedError, below, jacobian, length, magnitudes, matrix, rounded, two_norm
 
+RANGE = 1e30  # of the largest entry of a matrix and of its inverse
+
 
 @dataclass(frozen=True, slots=True)
 class Norm:
@@ -71,6 +73,23 @@ class Metric:
         return float(np.sqrt(((np.abs(self.S) @ bounds) ** 2).sum()) * (1.0 + 1e-13))
 
 
+def usable_inverse(m: Array, what: str) -> arb_mat:
+    """Balls around m⁻¹ of a matrix of exact doubles (n, n).
+
+    Raises NotProvedError if m is singular, or if the largest entry of m or of m⁻¹ is not within 1/RANGE and RANGE:
+    bounds are computed with squares of floats, which would underflow to 0 or overflow.
+    """
+    try:
+        inverse = matrix(m).inv()
+    except ZeroDivisionError as error:
+        raise NotProvedError(f"{what} is singular") from error
+    for values, of in ((np.abs(m), ""), (magnitudes(inverse), "inverse of ")):
+        if not 1.0 / RANGE <= (largest := float(values.max())) <= RANGE:
+            wanted = f"wanted {1.0 / RANGE:g} to {RANGE:g}"
+            raise NotProvedError(f"the {of}{what}: the largest entry is {largest:g}, {wanted}; choose other units")
+    return inverse
+
+
 def modal_metric(A: Array, scale: Array) -> Array:
     """S (n, n) such that ‖S x‖₂ contracts as fast as the slowest mode of A; each mode weighs as in ‖scale x‖₂.
 
@@ -92,14 +111,11 @@ def modal_metric(A: Array, scale: Array) -> Array:
 def proved_metric(system: ExactSystem, S: Array) -> Metric:
     """The metric with a proved alpha > 0 (Gershgorin's rows of the symmetric part of S A S⁻¹).
 
-    Raises NotProvedError if the linear part does not contract in it.
+    Raises NotProvedError if the linear part does not contract in it, or for entries too large or small for floats.
     """
     zero = [arb(0)]
     A = jacobian(system, zero * system.n, zero * system.m)
-    try:
-        inverse = matrix(S).inv()
-    except ZeroDivisionError as error:
-        raise NotProvedError("the metric is singular") from error
+    inverse = usable_inverse(S, "metric")
     turned = matrix(S) * A * inverse
     symmetric = (turned + turned.transpose()) / 2
     alpha = np.inf

@@ -13,16 +13,19 @@ from dataclasses import dataclass
 import numpy as np
 from flint import arb
 
-from .balls import Array, ExactSystem, NotProvedError, above, column, jacobian
+from .balls import Array, ExactSystem, NotProvedError, above, jacobian, refuse_unrest
 from .cells import Decay, decay, errors, inputs, ranges
 from .growth import perturbed
+from .joint import largest
 from .majorant import Majorant, majorant
-from .norms import Metric, Norm
-from .tube import Off, Piece, Tube, both, followed, jumps, prove_tube
+from .norms import Metric, Norm, usable_inverse
+from .tube import Off, Piece, Tube, at_end, followed, jumps, prove_tube
 
 SETTLED = 1e-3
 ROOM = 1.5  # of the box on which the equations are bounded, over the largest motion
 ROOM_INPUT = 10.0  # the same for inputs, so that a quiet motion under a large input is not taken for a large one
+
+UNDERFLOW = 1e-80  # squares that floats round to 0 make less than 1e-154, times sizes within `norms.RANGE`
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,20 +57,21 @@ class Proof:
     def epsilon(self, norm: Norm, delta: Array) -> Array:
         """ε (K,) for δ (K,) ≥ 0: N(x(0) − ψ(0)) ≤ δ implies N(x(t) − ψ(t)) ≤ ε for all t ≥ 0; inf if not proved.
 
-        ε(0) bounds the floor l.
+        ε(0) bounds the floor l. Raises NotProvedError for a norm that floats cannot compute.
         """
-        rows, kappa, c = self.decay.rows(norm), self.decay.of(norm), self.metric.of(norm)
+        usable_inverse(norm.T, f"matrix of the {norm.name} norm")
+        rows = self.decay.rows(norm)
         bound = self.majorant(rows.max(axis=0) * delta.max())
         spread = np.zeros((*self.X.shape, len(delta)))
         spread[:, : self.system.n] = rows[:, :, None] * delta
         top, end = perturbed(self.metric, bound, self.decay.width, self.X, spread, np.zeros(len(delta)))
-        on_pieces = errors(self.tube, self.metric, norm)[:, None] + kappa[:, None] * delta + c * top
+        on_pieces = largest(self.tube, self.metric, self.decay, norm, delta, top)
         later = self._later(norm, bound, self.decay.at_end(self.metric, norm) * delta + end)
-        return np.maximum(on_pieces.max(axis=0), later) * (1.0 + 1e-9)
+        return np.maximum(on_pieces.max(axis=0), later) * (1.0 + 1e-9) + UNDERFLOW
 
     def settled(self, norm: Norm, floor: float) -> bool:
         """Whether longer pieces would lower this floor by less than SETTLED of it: the tail has no part in it."""
-        return floor <= (1.0 + SETTLED) * float(errors(self.tube, self.metric, norm).max())
+        return floor <= (1.0 + SETTLED) * float(errors(self.tube, self.metric, norm).max()) + UNDERFLOW
 
     def majorant(self, spread: Array) -> Majorant:
         """R̄ on a box with room for motions that are off the reference by `spread` (n,)."""
@@ -90,18 +94,22 @@ class Proof:
     def ends(self) -> tuple[float, float]:
         """Bounds of ‖x‖_S and ‖e‖_S at the end of the last piece."""
         last = self.tube.pieces[-1]
-        x = self.metric.length(column([sum(row, arb(0)) for row in both(last)]))
-        e = self.metric.length(column([sum((arb(v) for v in row), arb(0)) for row in last.error.tolist()]))
+        x = self.metric.length(at_end(last.linear) + at_end(last.error))
+        e = self.metric.length(at_end(last.error))
         _, V, V_e = self.tube.at_end
         return (x + V) * (1.0 + 1e-15), (e + V_e) * (1.0 + 1e-15)
 
 
 def prove(system: ExactSystem, metric: Metric, pieces: Sequence[Piece], x0: Sequence[float]) -> Proof:
     """Prove what can be proved from these pieces. Raises NotProvedError if they do not suffice."""
+    refuse_unrest(system)
     if pieces[0].begin != 0:
         raise NotProvedError(f"the first piece begins at t = {float(pieces[0].begin):g} s; wanted 0")
-    if pieces[-1].end < system.pieces[-1][0]:
+    corner, last = system.pieces[-1]
+    if pieces[-1].end < corner:
         raise NotProvedError("the pieces end before the road's last corner")
+    if system.period == 0 and not all(w == 0 for w in last(arb(0, math.inf))):
+        raise NotProvedError("the road has no period, and after its last corner it is not proved to be flat")
     tube = prove_tube(system, metric, pieces, (np.array(x0, dtype=float), np.zeros(system.n)))
     X = np.hstack([ranges(tube.pieces, tube.full, metric), inputs(system, metric, tube.pieces)])
     again = _repetition(system, metric, tube) if system.period != 0 else None

@@ -11,18 +11,19 @@ What it still says too much, as nothing cancels over time, whoever prints it mea
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from flint import arb, fmpq
 
-from .balls import Array, ExactSystem, NotProvedError, above, column
+from .balls import Array, ExactSystem, NotProvedError, above
 from .cells import Decay, counts, decay, inputs, ranges, sampled, widths
 from .growth import perturbed
 from .majorant import Majorant, majorant
 from .norms import Metric, Norm
 from .proof import rest_growth
 from .taylor import find_pieces
-from .tube import Piece, prove_linear
+from .tube import Piece, at_end, prove_linear
 
 ROOM, SHARE = 2.0, 0.1  # of the box, over x_lin's sizes, and over what a motion of its size could be in each state
 POINTS = 4  # of a cell, for R along x_lin
@@ -42,18 +43,18 @@ def quick_floors(
     X = np.hstack([ranges(pieces, off, metric), inputs(system, metric, pieces)])
     spread = np.pad(metric.reach * metric.longest(X.max(axis=0)[:n]), (0, system.m))
     bound = majorant(system, ROOM * X.max(axis=0) + SHARE * spread + 1e-9)
-    V, at_end = perturbed(metric, bound, widths(pieces, metric), np.zeros_like(X), X[:, :, None], np.zeros(1))
+    V, V_end = perturbed(metric, bound, widths(pieces, metric), np.zeros_like(X), X[:, :, None], np.zeros(1))
     if not np.isfinite(V).all():
         raise NotProvedError("the quick comparison cannot follow so large a motion")
     lefts = [np.eye(n), metric.S, *(norm.T for norm in norms)]
     along = _along(system, metric, pieces, off, X, bound)
     rows = _states(bound, X, along, V * metric.reach, decay(metric, pieces), lefts)
-    last = metric.length(column([arb(v) for v in pieces[-1].linear.sum(axis=1).tolist()])) * (1 + 1e-12) + off[-1]
-    e_end = min(float(at_end[0]), float(np.sqrt((rows[1][-1] ** 2).sum())) * SLACK)
-    L = rest_growth(system, metric, last + e_end)
+    e_end = min(float(V_end[0]), float(np.sqrt((rows[1][-1] ** 2).sum())) * SLACK)
+    size = (metric.length(at_end(pieces[-1].linear)) + float(off[-1]) + e_end) * SLACK
+    L = rest_growth(system, metric, size)
     if not metric.alpha > L:
         raise NotProvedError("the quick comparison cannot follow so large a motion")
-    later = e_end + L * (last + e_end) / (metric.alpha - L)
+    later = e_end + L * size / (metric.alpha - L)
     return [max(_largest(norm, y), metric.of(norm) * later) * SLACK for norm, y in zip(norms, rows[2:], strict=True)]
 
 
@@ -64,8 +65,8 @@ def _largest(norm: Norm, rows: Array) -> float:
 def _along(
     system: ExactSystem, metric: Metric, pieces: Sequence[Piece], off: Array, X: Array, bound: Majorant
 ) -> Array:
-    """Bounds (N, n) of |R(x_lin, w)| over the cells: R's own terms in the middles of POINTS parts, R̄ for what is off."""
-    found, driven, cell, reach = [], X[:, system.n :].any(axis=1), 0, metric.reach
+    """Bounds (N, n) of |R(x_lin, w)| over the cells: R itself in the middles of POINTS parts, R̄ for what is off."""
+    found, driven, cell, reach = [], X[:, system.n :].max(axis=1) > 0.0, 0, metric.reach
     for piece, count, V in zip(pieces, counts(pieces, metric), off, strict=True):
         values, bend = sampled(piece.linear, count * POINTS)
         middle = np.zeros((X.shape[1], count * POINTS))
@@ -108,7 +109,7 @@ def _states(bound: Majorant, X: Array, along: Array, e: Array, flow: Decay, left
     return np.split(found, len(lefts), axis=1)
 
 
-def _over(ends: Array, values: Array, begins: Array, stops: Array) -> Array:
+def _over(ends: Any, values: Array, begins: Any, stops: Any) -> Array:
     """Largest of the cells' values (N, …) over each span from begins to stops (K,); cells end at ends (N + 1,)."""
     room = (SLACK - 1.0) * ends[-1]
     first = np.searchsorted(ends[1:], begins - room).clip(max=len(values) - 1)

@@ -29,7 +29,7 @@ ROOM = 1.5  # of the box on which the equations are bounded, over the largest mo
 ROUNDS = 6  # of widening D until it holds
 RADIUS = 6.0  # in u, of the disc on which R(p, ŵ) is bounded: at its nodes' polynomial of degree 6 it is then off by
 OFF = 4.0 * (RADIUS + np.sqrt(RADIUS**2 - 1.0)) ** -6 / (RADIUS + np.sqrt(RADIUS**2 - 1.0) - 1.0)  # times the bound
-BOX = 1e-9  # of it, at least
+SHARE, LEAST = 0.1, 1e-9  # of it, at least: of what the whole motion could be in one state, and in SI units
 CONVERTED = 1e-10  # relative: what the values at the nodes lose as coefficients of τᵏ, with much to spare
 
 
@@ -133,7 +133,8 @@ def _forcing(system: ExactSystem, metric: Metric, samples: Samples, tilted: int)
     n, AB, row = system.n, np.hstack([rounded(metric.A)[0], rounded(input_matrix(system))[0]]), system.n // 2 + tilted
     most = np.concatenate([np.abs(samples.x).max(axis=0), np.abs(samples.inputs).max(axis=(0, 1))])
     more = np.concatenate([samples.open.max(axis=0), samples.peak.max(axis=0)])
-    bound = majorant(system, ROOM * most + 2.0 * more + BOX)
+    could = metric.reach * np.sqrt(((samples.x @ metric.S.T) ** 2).sum(axis=1)).max()  # also of states that rest
+    bound = majorant(system, ROOM * most + 2.0 * more + np.append(SHARE * could, np.zeros(system.m)) + LEAST)
     r, A = _reference(bound, AB, samples), np.abs(AB[:, :n])
     rounding = EPS * ((np.abs(AB) @ r.X).T + np.abs(r.p.coefficients) @ np.arange(6) / r.p.half[:, None])
     wrong = np.abs(r.defect @ CHEBYSHEV.T).sum(axis=2) + r.off + rounding

@@ -23,13 +23,14 @@ from .balls import (
     jacobian,
     length,
     matrix,
+    refuse_unrest,
     rounded,
     two_norm,
 )
 from .cells import errors
-from .norms import Metric, Norm, proved_metric
+from .norms import Metric, Norm, proved_metric, usable_inverse
 from .proof import at_rest
-from .tube import Excess, Piece, Tube, both, closed, defect_of, exact, grown, jumps, refuse_gaps
+from .tube import Excess, Piece, Tube, both, closed, defect_of, exact, grown, jumps, refuse_gaps, up
 
 PARTS = 4  # of a piece, over each of which A(t) is enclosed
 Equations = Callable[..., Sequence[Any]]
@@ -90,7 +91,12 @@ class Measured:
     def tubes(self, norm: Norm, delta: float) -> list[Tube]:
         """A tube for each phase, around all motions that start within δ."""
         phases = self.switched.phases
-        V = delta * carried(matrix(norm.T).inv(), matrix(phases[0].metric.S), norm.largest)
+        V = up(
+            delta
+            * carried(
+                usable_inverse(norm.T, f"matrix of the {norm.name} norm"), matrix(phases[0].metric.S), norm.largest
+            )
+        )
         off = 0.0, V, V
         rest = np.zeros((self.switched.system.n, 1))
         start = rest, rest
@@ -98,7 +104,7 @@ class Measured:
         for k, phase in enumerate(phases):
             if k:
                 c = carried(phases[k - 1].metric.inverse, matrix(phase.metric.S), largest=False)
-                off = off[0] * c, off[1] * c, off[2] * c
+                off = up(off[0] * c), up(off[1] * c), up(off[2] * c)
             tube = self._followed(phase.metric, [i for i, p in enumerate(self.phase) if p == k], start, off)
             found.append(tube)
             off, start = tube.at_end, (tube.pieces[-1].linear, tube.pieces[-1].error)
@@ -109,12 +115,12 @@ class Measured:
         widths, rates = [], []
         for i in which:
             piece, mu, (d_lin, d) = self.pieces[i], float(self.mu[i]), self.defects[i].tolist()
-            V_lin, V, V_e = (v + j for v, j in zip((V_lin, V, V_e), jumps(metric, before, piece), strict=True))
+            V_lin, V, V_e = (up(v + j) for v, j in zip((V_lin, V, V_e), jumps(metric, before, piece), strict=True))
             after, L = closed(self.switched.system, metric, piece, V, d, self.switched.excess, mu)
             after_lin, full = grown(V_lin, mu, d_lin, piece), max(V, after)
-            after_e = grown(V_e, mu, (L * full + d_lin + d) * (1.0 + 1e-15), piece)
+            after_e = grown(V_e, mu, arb(L) * full + d_lin + d, piece)
             widths.append((max(V_lin, after_lin), full, max(V_e, after_e)))
-            rates.append(L + mu)
+            rates.append(up(L + mu))
             V_lin, V, V_e = after_lin, after, after_e
             before = piece.linear, piece.error
         linear, full_, error = np.array(widths).T
@@ -134,6 +140,7 @@ def carried(right: arb_mat, left: arb_mat, largest: bool) -> float:
 
 def measured(switched: Switched, pieces: Sequence[Piece]) -> Measured:
     """What is known of the pieces. Raises NotProvedError where they leave a gap or cross from phase to phase."""
+    refuse_unrest(switched.system)
     system, begins = switched.linear_system, [phase.begin for phase in switched.phases]
     if pieces[0].begin != 0 or pieces[-1].end <= begins[-1]:
         raise NotProvedError("the pieces do not reach from 0 into the last phase")

@@ -8,12 +8,13 @@ from typing import Any
 import numpy as np
 from flint import arb, arb_mat, arb_series, fmpq
 
-from .balls import ExactSystem, NotProvedError, coefficients, column, cosine, jacobian, precision, sine
+from .balls import ExactSystem, NotProvedError, coefficients, column, cosine, decimal, jacobian, precision, sine
 from .tube import Piece
 
 DEGREE = 30
 LAST_TERM = 1e-13  # of a polynomial, over the size of the motion: it sets the length of a piece
 LONGEST, SHORTEST = 0.25, 1e-5  # s
+MOST = 5000  # pieces; more are no certificate that anyone would read or verify
 
 
 def find_pieces(
@@ -28,7 +29,11 @@ def find_pieces(
 
     linear_only : e is left at 0.
     changing    : what x_lin obeys, if its A changes in time.
+
+    Raises NotProvedError where the motion runs away, or for more than MOST pieces.
     """
+    if stop > MOST * decimal(LONGEST):
+        raise _too_long(stop, MOST * LONGEST)
     zero = [arb(0)]
     A = jacobian(system, zero * system.n, zero * system.m)
     B = jacobian(system, zero * system.n, zero * system.m, inputs=True)
@@ -44,6 +49,8 @@ def find_pieces(
         h = _length(full, size)
         if not h > SHORTEST:
             raise NotProvedError(f"the motion runs away near t = {float(t):g} s: its Taylor series lasts {h:.1g} s")
+        if len(pieces) == MOST:
+            raise _too_long(stop, float(t))
         left = min([c for c in corners if c > t] + [stop]) - t
         pieces.append(_scaled(linear, full, t, t + _fitting(h, left)))
         ends = pieces[-1].linear.sum(axis=1), pieces[-1].error.sum(axis=1)
@@ -51,6 +58,12 @@ def find_pieces(
         x = [arb(a) + arb(b) for a, b in zip(*(end.tolist() for end in ends), strict=True)]
         t = pieces[-1].end
     return pieces
+
+
+def _too_long(stop: fmpq, reach: float) -> NotProvedError:
+    return NotProvedError(
+        f"the motion must be followed to t = {float(stop):g} s, but {MOST} pieces reach {reach:g} s at most"
+    )
 
 
 def _linear_taylor(A: arb_mat, B: arb_mat, x0: arb_mat, w: Sequence[Any]) -> list[list[Any]]:

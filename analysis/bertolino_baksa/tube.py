@@ -12,6 +12,7 @@ they were found does not matter to the proof (`taylor.py` finds them).
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
@@ -103,12 +104,12 @@ def followed(
     widths, rates = [], []
     refuse_gaps(pieces)
     for piece, (d_lin, d) in zip(pieces, defects.tolist(), strict=True):
-        V_lin, V, V_e = (v + jump for v, jump in zip((V_lin, V, V_e), jumps(metric, before, piece), strict=True))
+        V_lin, V, V_e = (up(v + jump) for v, jump in zip((V_lin, V, V_e), jumps(metric, before, piece), strict=True))
         after, L = closed(system, metric, piece, V, d, excess, -metric.alpha)
         after_lin, full = grown(V_lin, -metric.alpha, d_lin, piece), max(V, after)
-        after_e = grown(V_e, -metric.alpha, (L * full + d_lin + d) * (1.0 + 1e-15), piece)
+        after_e = grown(V_e, -metric.alpha, arb(L) * full + d_lin + d, piece)
         widths.append((max(V_lin, after_lin), full, max(V_e, after_e)))
-        rates.append(L - metric.alpha)
+        rates.append(up(L - metric.alpha))
         V_lin, V, V_e = after_lin, after, after_e
         before = piece.linear, piece.error
     linear, fulls, errors = np.array(widths).T
@@ -121,7 +122,7 @@ def prove_linear(system: ExactSystem, metric: Metric, pieces: Sequence[Piece]) -
     found = []
     refuse_gaps(pieces)
     for piece in pieces:
-        V += jumps(metric, before, piece)[0]
+        V = up(V + jumps(metric, before, piece)[0])
         after = grown(V, -metric.alpha, _linear_defect(system, metric, B, piece), piece)
         found.append(max(V, after))
         V, before = after, (piece.linear, piece.error)
@@ -129,6 +130,7 @@ def prove_linear(system: ExactSystem, metric: Metric, pieces: Sequence[Piece]) -
 
 
 def refuse_gaps(pieces: Sequence[Piece]) -> None:
+    """Raise NotProvedError unless each piece begins where the one before it ends."""
     for k, (piece, following) in enumerate(pairwise(pieces)):
         if piece.end != following.begin:
             raise NotProvedError(f"pieces {k} and {k + 1} do not follow each other")
@@ -145,20 +147,31 @@ def both(piece: Piece) -> list[list[Any]]:
     return [[arb(a) + arb(b) for a, b in zip(lin, rest, strict=True)] for lin, rest in rows]
 
 
+def at_end(polynomials: Array) -> arb_mat:
+    """Exact values (n, 1) at τ = 1."""
+    return column([sum(row, arb(0)) for row in exact(polynomials)])
+
+
 def jumps(metric: Metric, before: tuple[Array, Array], piece: Piece) -> Off:
     """‖·‖_S of the jumps of the polynomials of x_lin, x and e at the piece's begin."""
-    old = [[sum((arb(v) for v in row), arb(0)) for row in c.tolist()] for c in before]
-    new = [[arb(v) for v in c[:, 0].tolist()] for c in (piece.linear, piece.error)]
-    linear, error = (column(n) - column(o) for n, o in zip(new, old, strict=True))
+    linear, error = (
+        column([arb(v) for v in new[:, 0].tolist()]) - at_end(old)
+        for new, old in zip((piece.linear, piece.error), before, strict=True)
+    )
     return metric.length(linear), metric.length(linear + error), metric.length(error)
 
 
-def grown(V: float, rate: float, defect: float, piece: Piece) -> float:
+def grown(V: float, rate: float, defect: Any, piece: Piece) -> float:
     """V at the piece's end under V' = rate V + defect."""
     h = arb(piece.duration)
     factor = (arb(rate) * h).exp()
     integral = h if rate == 0.0 else (factor - 1) / arb(rate)
     return above(factor * V + integral * defect)
+
+
+def up(x: float) -> float:
+    """A float that is not below a number rounded to x."""
+    return math.nextafter(x, math.inf)
 
 
 def exact(polynomials: Array) -> list[list[Any]]:
@@ -257,10 +270,10 @@ def closed(
     w = over(system, piece)
     most = 2.0 * (V + defect * above(arb(piece.duration)))
     for _ in range(TRIES):
-        box = [r + arb(0, n * most) for r, n in zip(ranges, metric.reach.tolist(), strict=True)]
+        box = [r + arb(0, up(n * most)) for r, n in zip(ranges, metric.reach.tolist(), strict=True)]
         try:
             L = metric.size(excess(box, w))
-            after = grown(V, L + rate, defect, piece)
+            after = grown(V, up(L + rate), defect, piece)
         except NotProvedError:  # wider than numbers go
             break
         if max(V, after) <= most:

@@ -96,9 +96,7 @@ def defect(car: Car, road: KnownRoad, export: Export) -> Defect:
     allowed = MISSED * _fourth_differences(rates[:, :, 0]) + GROWS * export.own * scales(rates[:, :, 0])
     allowed += _digits(car, found.half, export.digits) + _open(car, road)
     if export.accelerations is not None and export.their_digits is not None:
-        after = np.concatenate(
-            [rates[1:, :, 0], rates[-1:, :, 1]]
-        )  # at a corner of the road they may be of either side
+        after = np.concatenate([rates[1:, :, 0], rates[-1:, :, 1]])  # at corners, of either side
         wrong = [np.abs(export.accelerations[1:] - side) for side in (rates[:, :, 1], after)]
         sizes = np.maximum(sizes, np.min(wrong, axis=0))
         allowed += export.their_digits[1:]

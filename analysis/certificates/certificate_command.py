@@ -28,7 +28,6 @@ from ..reference import Parameters, car_of, road_parameters
 from ..tyres import static_loads_of
 from .car_bounded_roads import statement as every_road
 from .car_certificates import build, car_norms, certify_car, prove_reference
-from .certificate_figures import adversary_points, draw_delta
 from .certificate_words import model_words, named_by_content, refuse_exceeded, start_words
 from .directed import at_least, at_most
 from .exact_car import exact_car
@@ -59,6 +58,8 @@ def make_certificate(parameters: Parameters, where: Path | None, *, largest: boo
     if where is not None:
         write_whole(where, to_json(certificate))
         print(f"{where}: written")
+        from .certificate_figures import adversary_points, draw_delta
+
         picture = where.with_suffix(".svg")
         write_whole(picture, draw_delta(adversary_points(certificate)))
         print(f"{picture}: written")

@@ -20,7 +20,6 @@ from ..car import car_equations
 from ..methods.polynomials import Array
 
 LEAST = 1e-3
-NEVER = fmpq(1000000)  # s; where a wheel meets no road
 
 
 def exact_car(car: Car) -> Any:
@@ -32,20 +31,21 @@ def exact_system(car: Car, road: RoadParameters, gain: Array | None = None) -> E
     """x' = F(x, w): the car of `car.car_form` with its four wheels on the road from t = 0 on."""
     delays = _delays(road)
     half = decimal(road.Lambda) / (2 * decimal(road.v0))  # half a wave; π/Ω
-    end = {"bump": half, "flat": fmpq(0)}.get(road.profile, NEVER)
-    corners = sorted({fmpq(0), *(t for d in delays for t in (d, d + end) if 0 < t < NEVER)})
+    length = {"bump": half, "flat": fmpq(0)}.get(road.profile)  # [s]; None: without end
+    met = [None if d is None else (d, None if length is None else d + length) for d in delays]
+    corners = sorted({fmpq(0), *(t for span in met for t in span or () if t is not None and t > 0)})
     shape = _shape(road, half)
-    pieces = tuple((begin, _under_wheels(shape, delays, [d <= begin < d + end for d in delays])) for begin in corners)
+    pieces = tuple((begin, _under_wheels(shape, [_since(span, begin) for span in met])) for begin in corners)
     period = 2 * half if road.profile in ("sine", "fourier", "step") else fmpq(0)
     return ExactSystem(14, 8, car_equations(exact_car(car), gain), pieces, period)
 
 
-def _delays(road: RoadParameters) -> list[fmpq]:
-    """Exact times at which the wheels fl, fr, rl, rr meet the profile."""
+def _delays(road: RoadParameters) -> list[fmpq | None]:
+    """Exact times at which the wheels fl, fr, rl, rr meet the profile; None for a wheel that meets none."""
     start, tau0 = decimal(road.t_start), decimal(road.tau0)
     rear = start + (decimal(road.a) + decimal(road.b)) / decimal(road.v0)
     met = (start, start + tau0, rear, rear + tau0)
-    return [d if on else NEVER for d, on in zip(met, road.excited, strict=True)]
+    return [d if on else None for d, on in zip(met, road.excited, strict=True)]
 
 
 def _shape(road: RoadParameters, half: fmpq) -> Callable[[Any], tuple[Any, Any]]:
@@ -64,9 +64,17 @@ def _shape(road: RoadParameters, half: fmpq) -> Callable[[Any], tuple[Any, Any]]
     return shape
 
 
-def _under_wheels(shape: Callable[[Any], tuple[Any, Any]], delays: list[fmpq], met: list[bool]) -> Callable[[Any], Any]:
+def _since(span: tuple[fmpq, fmpq | None] | None, t: fmpq) -> fmpq | None:
+    """When a wheel met the profile that is under it just after t, between these times; None where there is none."""
+    if span is None:
+        return None
+    begin, end = span
+    return begin if begin <= t and (end is None or t < end) else None
+
+
+def _under_wheels(shape: Callable[[Any], tuple[Any, Any]], since: list[fmpq | None]) -> Callable[[Any], Any]:
     def w(t: Any) -> list[Any]:
-        pairs = [shape(t - arb(d)) if on else (arb(0), arb(0)) for d, on in zip(delays, met, strict=True)]
+        pairs = [(arb(0), arb(0)) if d is None else shape(t - arb(d)) for d in since]
         return [h for h, _ in pairs] + [dh for _, dh in pairs]
 
     return w

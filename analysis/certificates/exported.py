@@ -12,7 +12,7 @@ import re
 from collections.abc import Iterator, Sequence
 from dataclasses import fields
 from decimal import Decimal
-from itertools import chain
+from itertools import chain, pairwise
 from pathlib import Path
 
 import numpy as np
@@ -69,6 +69,7 @@ def read_export(path: Path, scenario: Scenario) -> tuple[Run, dict[str, Array]]:
     _refuse_gaps(trajectory, path)
     _refuse_another(trajectory, scenario, path)
     rounding = {name: _rounding([row[i] for row in cells]) for i, name in enumerate(names) if name != "time"}
+    rounding["time"] = _late([row[0] for row in cells])
     own = _texts(rows)
     if own.get("profile", profile := scenario.parameters.get("profile", PROFILE.start)) != profile:
         raise InputError(f"{path}: row 2, column 'profile': wanted {profile!r}, got {own['profile']!r}")
@@ -145,3 +146,9 @@ def _rounding(cells: list[str]) -> Array:
     finest = min(value.adjusted() + 1 - len(value.as_tuple().digits) for value in used)
     last = [max(finest, value.adjusted() + 1 - digits) if value else finest for value in values]
     return np.array([0.5 * 10.0**exponent for exponent in last])
+
+
+def _late(cells: list[str]) -> Array:
+    """The same (N,) of times [s], but none where they rise by one exact step, which only the last may cut short."""
+    steps = [b - a for a, b in pairwise(Decimal(cell.strip()) for cell in cells)]
+    return np.zeros(len(cells)) if len(set(steps[:-1])) <= 1 else _rounding(cells)

@@ -13,7 +13,7 @@ from fmu_src.quantities import ACCELERATIONS, FORCES, ROAD_HEIGHTS, STATES
 from ..bertolino_baksa.balls import NotProvedError, precision
 from ..bertolino_baksa.norms import proved_metric
 from ..bertolino_baksa.sampled import Samples
-from ..car import road_signal
+from ..car import car_form, road_signal
 from ..check import own_error
 from ..discrepancy import scales
 from ..errors import InputError
@@ -28,6 +28,7 @@ from .directed import at_most
 from .exact_car import energy_norm, exact_system
 from .exported import BY_DEFAULT, SAMPLING, read_export
 from .falsification import Motions, Rows, judged, motions
+from .printed_times import input_within, moved, steepest
 from .unknown_roads import AllRoads, RoadClass, on_all_roads, samples
 from .unknown_roads import road_class as read_class
 
@@ -43,7 +44,8 @@ def certified_findings(
 ) -> tuple[list[Finding], str]:
     """Findings on a passive run on a profile of ours, or on any road of a class; if there are none, why.
 
-    rounding : of each column's printed digits (N,); by default that of doubles.
+    rounding : of each column's printed digits (N,); by default that of doubles. That of times counts as what motions do
+               meanwhile, and exported accelerations are not judged then.
     """
     columns = run.trajectory
     if reason := acting(run):
@@ -61,12 +63,21 @@ def certified_findings(
         return columns.columns([*names])[: len(t)], digits(names)
 
     x, open_ = of([q.name for q in STATES])
+    late = np.zeros(len(t)) if rounding is None else rounding["time"][: len(t)]
+    form = car_form(car_of(run.parameters), order=1)
     names = [q.name for q in ACCELERATIONS]
-    more, more_open = of(names) if set(names) <= set(columns.names) else (None, None)
-    export = Export(t, x, open_, more, more_open, own_error(run))
+    more, more_open = of(names) if set(names) <= set(columns.names) and not late.any() else (None, None)
     if roads is None:
-        return _on_its_road(run, export, file)
-    return _on_roads(run, export, file, roads, *of([q.name for q in ROAD_HEIGHTS]))
+        open_ = open_ + moved(
+            form, x, open_, late, *input_within(road_signal(road_parameters(run.parameters)), t, late)
+        )
+        return _on_its_road(run, Export(t, x, open_, more, more_open, own_error(run)), file)
+    heights, road_open = of([q.name for q in ROAD_HEIGHTS])
+    rates = steepest(t, late, heights, road_open, roads.bound, roads.kind == "curv")
+    road_open = road_open + late[:, None] * rates
+    w, loose = np.hstack([heights, np.zeros_like(rates)]), np.hstack([road_open, rates])
+    export = Export(t, x, open_ + moved(form, x, open_, late, w, loose), more, more_open, own_error(run))
+    return _on_roads(run, export, file, roads, heights, road_open)
 
 
 def _on_its_road(run: Run, export: Export, file: str) -> tuple[list[Finding], str]:

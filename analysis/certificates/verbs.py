@@ -17,7 +17,7 @@ def add_verbs(verbs: Any, scenario: str) -> None:
     verb.add_argument("scenario", help=f"{scenario}; or a run folder, which then gets its certificate and figures")
     verb.add_argument("-o", "--out", type=Path, metavar="CERT.json", help="certificate to write; CERT.svg: its figure")
     kind = verb.add_mutually_exclusive_group()
-    kind.add_argument("--quick", action="store_true", help="a coarse floor in a second, by scalar comparison")
+    kind.add_argument("--quick", action="store_true", help="a coarse floor in about a second, by comparison")
     kind.add_argument("--largest", action="store_true", help="also search the largest amplitude that can be certified")
     kind.add_argument("--closed-loop", action="store_true", help="under control for ever, and against no control")
     kind.add_argument("--bounded", type=float, metavar="A", help="every road with |h| <= A [m] instead, around rest")
