@@ -89,7 +89,7 @@ def worst(
     The first starts are those that the linear part carries furthest from e on, at many times. From the worst of them
     on, the full equations are linearised around their own motion, whose furthest start is the next.
     """
-    inverse = np.linalg.inv(norm.T)
+    inverse = np.asarray(np.linalg.inv(norm.T))
     crowd = _furthest(form, norm, delta, *_errors(form, signal, x0, stop), CANDIDATES)
     best, at = 0.0, crowd[:, 0]
     for _ in range(rounds + 1):
