@@ -12,7 +12,6 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
-from scipy.integrate import solve_ivp
 
 from fmu_src.controller.design import design
 from fmu_src.controller.hardware import NONE, Forces, Loop, Memory
@@ -168,6 +167,8 @@ def in_stretches(
     The rate is asked for times a little inside each stretch, where it has not jumped. Raises InputError where the
     integration does not come to its end.
     """
+    from scipy.integrate import solve_ivp  # takes a moment to import
+
     inner = (t for t in {*corners} if times[0] + NUDGE < t < times[-1] - NUDGE)
     edges = [times[0], *sorted(inner), times[-1]]
     states = np.empty((len(times), len(x0)))

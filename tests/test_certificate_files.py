@@ -4,17 +4,19 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable
+from dataclasses import replace
 from functools import cache
 from typing import Any
 
+import numpy as np
 import pytest
 from test_almost_stable import certified, cubic, rehashed
 from test_bounded_inputs import tied_gains
 
 from analysis.bertolino_baksa import bounded_certificate, strict
-from analysis.bertolino_baksa.balls import precision
+from analysis.bertolino_baksa.balls import NotProvedError, precision
 from analysis.bertolino_baksa.bounded_inputs import Bounds
-from analysis.bertolino_baksa.certificate import certificate_of, from_json, opened, to_json
+from analysis.bertolino_baksa.certificate import certificate_of, from_json, opened, to_json, verify
 from analysis.bertolino_baksa.norms import euclid
 from analysis.certificates.car_certificates import build, model_of
 from analysis.errors import InputError
@@ -57,6 +59,8 @@ COMMON: list[Change] = [
     lambda c: c["claims"][0].update(l=str(c["claims"][0]["l"])),
     lambda c: c["claims"][0]["delta of eps"][1].update(at=0.0),
     lambda c: c["claims"][0]["delta of eps"][1].update(eps=str(c["claims"][0]["delta of eps"][1]["eps"])),
+    lambda c: c["claims"][0].update({"delta of eps": []}),
+    lambda c: c.update(claims={"norm": 1}),
     lambda c: c["claims"][0]["norm"]["T"][0].__setitem__(0, True),
     lambda c: c["metric"][0].__setitem__(0, 1),
 ]
@@ -87,6 +91,15 @@ def test_a_file_of_bounded_inputs_that_says_anything_else_is_refused(change: Cha
     content = json.loads(bounded())
     change(content)
     refuse(rehashed(content))
+
+
+def test_a_file_of_another_number_of_states_is_of_another_system() -> None:
+    """The numbers of x' = −x + x³ with the car's name on them."""
+    with pytest.raises(NotProvedError, match="wanted 14 states, got 1"):
+        verify(replace(from_json(motion(), "here"), model=model_of({})), build)
+    with pytest.raises(NotProvedError, match="wanted 14 states, got 2"):
+        few = opened(bounded(), "here", bounded_certificate.certificate_of)
+        bounded_certificate.verify(replace(few, model=model_of({}), bounds=Bounds(np.ones(8))), build)
 
 
 def test_a_key_stands_once_and_a_number_is_one_that_a_double_holds() -> None:

@@ -90,7 +90,10 @@ def test_a_statement_says_which_car_road_gain_and_start() -> None:
     gain = (0.5 * np.eye(4, 14)).tolist()
     model: dict[str, Any] = {"parameters": {"c1": 15000.0, "b1": 1212.5, "profile": "sine", "excite_rl": False}}
     first, second = model_words(model)
-    assert first == "  car and road: profile = sine, b1 = 1212.5 N.s/m, excite_rl = False; the rest is the default"
+    assert (
+        first
+        == "  car and road: profile = sine, A = 0.01 m, b1 = 1212.5 N.s/m, excite_rl = False; the rest is the default"
+    )
     assert second == "  without control"
     said = model_words({**model, "gain": gain})
     assert len(said) == 6 and said[2].startswith("    u_fl = -(0.5 0 0")

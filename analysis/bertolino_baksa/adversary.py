@@ -9,7 +9,6 @@ import math
 from collections.abc import Iterator, Sequence
 
 import numpy as np
-from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 
 from ..methods.linear_response import linear_response
@@ -64,6 +63,8 @@ def excursions(
 
 def reference_floor(form: StandardForm, signal: Signal, norms: Sequence[Norm], x0: Array, stop: float) -> Array:
     """sup N(x − x_lin) (norms,) up to `stop` [s] of the motion from x0 itself, tightly integrated: the true floor."""
+    from scipy.integrate import solve_ivp  # takes a moment to import
+
     times, e = [], []
     edges, x = [t for t in signal.edges if t < stop] + [stop], np.asarray(x0, dtype=float)
     for piece, begin, end in zip(signal.pieces, edges, edges[1:], strict=False):

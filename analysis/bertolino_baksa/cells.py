@@ -53,6 +53,12 @@ class Decay:
         off = self._rounding(left, inverse, rest)
         return (np.maximum(sizes[:-1], sizes[1:]) + bend) * (1 + EPS) + off
 
+    def sizes(self, left: Array) -> Array:
+        """(N, p, n) ≥ sup |left e^(At)| over each cell, entry by entry; left (p, n) exact."""
+        values, bend = np.abs(left @ self.ends), np.abs(left) @ self.curve
+        off = self._rounding(left, np.eye(left.shape[1]), 0.0)
+        return np.asarray((np.maximum(values[:-1], values[1:]) + bend) * (1 + EPS) + off)
+
     def at_end(self, metric: Metric, norm: Norm) -> float:
         """c ≥ ‖e^(AT) y‖_S/N(y) at the end T."""
         inverse, rest = rounded(matrix(norm.T).inv())
@@ -131,7 +137,7 @@ def ranges(pieces: Sequence[Piece], off: Array, metric: Metric) -> Array:
     """X (N, n) ≥ sup |x_j| over each of the cells of `decay`, for motions within `off` (pieces,) of the pieces' x."""
     found = []
     for piece, count, V in zip(pieces, counts(pieces, metric), off, strict=True):
-        values, bend = _sampled(piece.linear + piece.error, count)
+        values, bend = sampled(piece.linear + piece.error, count)
         found.append(np.maximum(np.abs(values[:, :-1]), np.abs(values[:, 1:])).T + bend + V * metric.reach)
     return np.concatenate(found) * (1 + EPS)
 
@@ -161,12 +167,12 @@ def finely(tube: Tube, metric: Metric, norm: Norm) -> Iterator[tuple[Array, Arra
     may leave the chords between; and V."""
     for piece, count, V in zip(tube.pieces, counts(tube.pieces, metric), tube.error.tolist(), strict=True):
         sizes = np.abs(norm.T) @ np.abs(piece.error)
-        values, bend = _sampled(norm.T @ piece.error, FINE, sizes)
+        values, bend = sampled(norm.T @ piece.error, FINE, sizes)
         at = np.arange(count)[:, None] * (FINE // count) + np.arange(FINE // count + 1)
         yield values[:, at].swapaxes(0, 1), bend, V
 
 
-def _sampled(coefficients: Array, cells: int, sizes: Array | None = None, begin: float = 0.0) -> tuple[Array, Array]:
+def sampled(coefficients: Array, cells: int, sizes: Array | None = None, begin: float = 0.0) -> tuple[Array, Array]:
     """Values (n, cells + 1) of polynomials at the cells' ends, and by how much (n,) they may leave the chords between.
 
     The cells divide what lies between `begin` (0 or −1) and 1.
@@ -183,7 +189,7 @@ def errors_of_states(tube: Tube, metric: Metric) -> Array:
     """sup |e_j| (n,) over all pieces."""
     found = []
     for piece, V in zip(tube.pieces, tube.error, strict=True):
-        values, bend = _sampled(piece.error, FINE)
+        values, bend = sampled(piece.error, FINE)
         found.append(np.abs(values).max(axis=1) + bend + V * metric.reach)
     return np.max(found, axis=0) * (1 + EPS)
 
@@ -193,7 +199,7 @@ def outputs(system: ExactSystem, tube: Tube, metric: Metric, functions: Outputs)
     low, high = [], []
     for piece, V in zip(tube.pieces, tube.full, strict=True):
         centres, rest = enclosed_series(system, piece, functions, metric.reach * V)
-        values, bend = _sampled(centres, FINE, begin=-1.0)
+        values, bend = sampled(centres, FINE, begin=-1.0)
         low.append((values - bend[:, None]).min(axis=1) - rest)
         high.append((values + bend[:, None]).max(axis=1) + rest)
     return np.min(low, axis=0), np.max(high, axis=0)

@@ -231,7 +231,7 @@ def opened(data: bytes, where: str, read: Callable[[dict[str, Any]], Read]) -> R
         if stated != _hash(content):
             raise InputError(f"{where}: the content does not have the hash that it states: it was altered")
         return read(content)
-    except (KeyError, TypeError, ValueError, AttributeError, RecursionError, ZeroDivisionError, OverflowError) as error:
+    except (LookupError, TypeError, ValueError, AttributeError, RecursionError, ArithmeticError) as error:
         raise InputError(f"{where}: cannot be read as a certificate: {type(error).__name__}: {error}") from error
 
 

@@ -113,6 +113,8 @@ def proved_metric(system: ExactSystem, S: Array) -> Metric:
 
     Raises NotProvedError if the linear part does not contract in it, or for entries too large or small for floats.
     """
+    if len(S) != system.n:
+        raise NotProvedError(f"another system: wanted {system.n} states, got {len(S)}")
     zero = [arb(0)]
     A = jacobian(system, zero * system.n, zero * system.m)
     inverse = usable_inverse(S, "metric")

@@ -19,9 +19,7 @@ from ..bertolino_baksa.bounded_certificate import certificate_of as bounded_of
 from ..bertolino_baksa.bounded_certificate import verify as verify_bounded
 from ..bertolino_baksa.cells import errors_of_states, outputs
 from ..bertolino_baksa.certificate import Certificate, certificate_of, opened, to_json, verify
-from ..bertolino_baksa.norms import proved_metric
 from ..bertolino_baksa.proof import Proof
-from ..bertolino_baksa.quick import quick_floors
 from ..bertolino_baksa.tube import Tube
 from ..car import car_form, road_signal
 from ..files import write_whole
@@ -29,7 +27,7 @@ from ..methods.polynomials import Array
 from ..reference import Parameters, car_of, road_parameters
 from ..tyres import static_loads_of
 from .car_bounded_roads import statement as every_road
-from .car_certificates import build, car_norms, certify_car, metric_of, model_of, prove_reference, stops
+from .car_certificates import build, car_norms, certify_car, prove_reference
 from .certificate_words import model_words, named_by_content, refuse_exceeded, start_words
 from .directed import at_least, at_most
 from .exact_car import exact_car
@@ -87,26 +85,6 @@ def judge_certificate(path: Path) -> int:
 
 def _any_kind(content: dict[str, Any]) -> Certificate | BoundedCertificate:
     return bounded_of(content) if content.get("kind") == KIND else certificate_of(content)
-
-
-def quick_answer(parameters: Parameters) -> int:
-    """Print floors from the scalar comparison, and how coarse they are; 0, or 1 if it proves none."""
-    car, road = car_of(parameters), road_parameters(parameters)
-    form, signal = car_form(car), road_signal(road)
-    try:
-        with precision(2):
-            system = build(model_of(parameters))
-            end = stops(system, form.A)[0]
-            named = car_norms(parameters)
-            floors = quick_floors(system, proved_metric(system, metric_of(car)), named, [0.0] * 14, end)
-    except NotProvedError as error:
-        print(f"no quick answer: {error}")
-        return 1
-    true = reference_floor(form, signal, named, np.zeros(14), float(end))
-    for norm, floor, least in zip(named, floors, true, strict=True):
-        coarse = f"{floor / least:.2g} times what a reference motion reaches"
-        print(f"l <= {at_most(floor)} in the {norm.name} norm ({coarse})")
-    return 0
 
 
 def statement(certificate: Certificate, proof: Proof) -> list[str]:

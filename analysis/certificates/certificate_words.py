@@ -53,6 +53,8 @@ def model_words(model: Mapping[str, Any]) -> list[str]:
     """The road's profile, what differs from the default in car and road, and what controls the car."""
     given = model["parameters"]
     said = {PROFILE.name: given.get(PROFILE.name, PROFILE.start)}
+    if said[PROFILE.name] in ("bump", "sine", "step"):
+        said["A"] = given.get("A", DEFAULTS["A"])
     said |= {name: value for name, value in given.items() if value != DEFAULTS[name]}
     off = ", ".join(f"{name} = {_number(value)}{_unit(name)}" for name, value in said.items())
     lines = [f"  car and road: {off}; the rest is the default"]

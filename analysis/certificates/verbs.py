@@ -1,0 +1,84 @@
+"""Verbs of the command line on certificates: certify, verify, conditions."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import Any
+
+from ..errors import InputError
+from ..scenario import read_scenario
+from ..trajectory import CERTIFICATE, RECORD, read_run
+
+
+def add_verbs(verbs: Any, scenario: str) -> None:
+    """Add them to the subparsers `verbs`; `scenario` says in words what names one."""
+    verb = verbs.add_parser("certify", help="prove that x_lin is almost stable (definition 2.1) on a scenario's road")
+    verb.add_argument("scenario", help=f"{scenario}; or a run folder, which then gets its certificate and figures")
+    verb.add_argument("-o", "--out", type=Path, metavar="CERT.json", help="certificate to write; CERT.svg: its figure")
+    kind = verb.add_mutually_exclusive_group()
+    kind.add_argument("--quick", action="store_true", help="a coarse floor in about a second, by comparison")
+    kind.add_argument("--largest", action="store_true", help="also search the largest amplitude that can be certified")
+    kind.add_argument("--closed-loop", action="store_true", help="under control for ever, and against no control")
+    kind.add_argument("--bounded", type=float, metavar="A", help="every road with |h| <= A [m] instead, around rest")
+    verb.add_argument("--slope", type=float, metavar="V", help="with --bounded: roads with |dh/dt| <= V [m/s] too")
+    verb.set_defaults(do=_certify)
+
+    verb = verbs.add_parser("verify", help="prove a certificate's claims anew")
+    verb.add_argument("certificate", type=Path, metavar="CERT", help="certificate (JSON)")
+    verb.set_defaults(do=_verify)
+
+    verb = verbs.add_parser("conditions", help="conditions 1 and 2 after (2.11), and the forms of them that can hold")
+    verb.add_argument("scenario", nargs="?", default="sine", help=f"{scenario} (default: sine)")
+    verb.set_defaults(do=_conditions)
+
+
+def _certify(options: argparse.Namespace) -> int:
+    if (folder := Path(options.scenario)).is_dir():
+        return _certify_run(folder, options)
+    if options.out and options.out.suffix == ".svg":
+        raise InputError(f"-o {options.out}: wanted a name for the certificate, CERT.json; its figure is CERT.svg")
+    scenario = read_scenario(options.scenario)
+    if options.out and options.quick:
+        raise InputError(f"-o {options.out}: --quick writes no certificate; leave it out")
+    if options.slope is not None and options.bounded is None:
+        raise InputError(f"--slope {options.slope!r}: wanted --bounded with it")
+    if options.bounded is not None:
+        from .car_bounded_roads import command
+
+        return command(scenario.parameters, options.bounded, options.slope, options.out)
+    if options.closed_loop:
+        from .closed_loop_certificate import command as compare
+
+        return compare(scenario.parameters, options.out)
+    if options.quick:
+        from .quick_command import quick_answer
+
+        return quick_answer(scenario.parameters)
+    from .certificate_command import make_certificate
+
+    return make_certificate(scenario.parameters, options.out, largest=options.largest)
+
+
+def _certify_run(folder: Path, options: argparse.Namespace) -> int:
+    from .certified_run import certify_run
+
+    if options.out or options.quick or options.largest or options.closed_loop or options.bounded is not None:
+        raise InputError(f"{folder}: a run folder is certified without options; for them give {folder / RECORD}")
+    if reason := certify_run(read_run(folder), folder):
+        print(f"no certificate: {reason}")
+        return 1
+    print(f"{folder / CERTIFICATE}: written; python -m analysis report {folder} shows its figures")
+    return 0
+
+
+def _verify(options: argparse.Namespace) -> int:
+    from .certificate_command import judge_certificate
+
+    return judge_certificate(options.certificate)
+
+
+def _conditions(options: argparse.Namespace) -> int:
+    from .car_conditions import command
+
+    return command(read_scenario(options.scenario).parameters)
