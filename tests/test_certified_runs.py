@@ -15,7 +15,7 @@ from made_up_run import made_up_run
 from matplotlib.figure import Figure
 
 from analysis.__main__ import _certify_shortly, main
-from analysis.bertolino_baksa.adversary import _furthest, motions
+from analysis.bertolino_baksa.adversary import _errors, _furthest, motions
 from analysis.bertolino_baksa.certificate import Certificate, to_json
 from analysis.bertolino_baksa.funnel import ends, funnel
 from analysis.bertolino_baksa.proof import Proof
@@ -88,8 +88,7 @@ def test_motions_from_within_delta_stay_in_the_funnel_which_is_not_much_wider(ma
     delta = float(table[len(table) // 2, 1])
     size, bound = funnel(proof, norm, delta)
     form, signal = car_form(car_of({})), road_signal(road_parameters({}))
-    grid = np.linspace(0.0, 0.5, 251)
-    far = _furthest(form, norm, delta, grid, np.zeros((14, len(grid))), 20)
+    far = _furthest(form, norm, delta, *_errors(form, signal, np.zeros(14), 0.5), 11)
     off = np.concatenate([far, rng.normal(size=(14, 20))], axis=1)
     times, x = zip(*motions(form, signal, off * delta / norm(off), 0.5, step=2.5e-4), strict=True)
     x_lin = linear_response(form.A, form.B, np.zeros(14), signal, np.array(times))

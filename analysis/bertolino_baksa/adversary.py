@@ -17,7 +17,7 @@ from ..methods.standard_form import StandardForm
 from .balls import Array
 from .norms import Norm
 
-STEP = 5e-4  # s, at most
+STEP, FINE_STEP = 5e-4, 2.5e-4  # s, at most
 SAMPLING = 5e-4  # s, of the true floor
 CANDIDATES = 64  # starts that the linear part proposes
 SPREAD = 8  # times as many are in the running: the best have neighbours nearly as good
@@ -89,7 +89,6 @@ def worst(
     The first starts are those that the linear part carries furthest from e on, at many times. From the worst of them
     on, the full equations are linearised around their own motion, whose furthest start is the next.
     """
-    inverse = np.asarray(np.linalg.inv(norm.T), dtype=float)
     crowd = _furthest(form, norm, delta, *_errors(form, signal, x0, stop), CANDIDATES)
     best, at = 0.0, crowd[:, 0]
     for _ in range(rounds + 1):
@@ -97,22 +96,22 @@ def worst(
         sizes = norm(off)  # (times, K)
         if not sizes.max() > best:
             break
-        _, k = np.unravel_index(np.argmax(sizes), sizes.shape)
+        k = int(np.argmax(sizes.max(axis=0)))
         best, at = float(sizes.max()), crowd[:, k]
         if rounds:
-            crowd = _from_its_own_motion(form, signal, norm, x0, at, delta, stop, inverse)
+            crowd = _from_its_own_motion(form, signal, norm, x0, at, delta, stop)
     return best, at
 
 
 def _from_its_own_motion(
-    form: StandardForm, signal: Signal, norm: Norm, x0: Array, at: Array, delta: float, stop: float, inverse: Array
+    form: StandardForm, signal: Signal, norm: Norm, x0: Array, at: Array, delta: float, stop: float
 ) -> Array:
-    """Starts (n, few) furthest by the equations' own derivatives along the motion from x0 + at, near its worst time."""
-    small = DIFFERENCE * delta
+    """Starts (n, few) furthest by the equations' derivatives along the motion from x0 + at, at its highest peaks."""
+    small, inverse = DIFFERENCE * delta, np.linalg.inv(norm.T)
     times, off = _offsets(form, signal, x0, at[:, None] + np.hstack([np.zeros((len(at), 1)), small * inverse]), stop)
     sizes = norm(off[:, :, 0])
-    top = [i for i in range(len(times)) if sizes[i] == sizes[max(i - 1, 0) : i + 2].max()]  # the peaks
-    peaks = sorted(top, key=lambda i: -sizes[i])[:PEAKS]
+    peaks = [i for i in range(len(times)) if sizes[i] == sizes[max(i - 1, 0) : i + 2].max()]
+    peaks = sorted(peaks, key=lambda i: -sizes[i])[:PEAKS]
     M = np.stack([norm.T @ (off[:, i, 1:] - off[:, i, :1]) / small for i in peaks])
     e = np.stack([norm.T @ off[:, i, 0] for i in peaks]) - M @ (norm.T @ at)
     z, _ = _directions(norm, e, M, delta)
@@ -134,14 +133,15 @@ def reached(
 ) -> list[Array]:
     """For each norm, sup N(x − x_lin) (K,) up to `stop` [s] over starts at N(x(0) − x0) = its deltas (K,).
 
-    By FEW first starts like those of `worst`, without its rounds and all in one integration: for a picture.
+    By FEW first starts like those of `worst`, without its rounds and all in one integration, in steps fine enough for
+    the floor as well.
     """
     errors = _errors(form, signal, x0, stop)
     crowds = [
         np.stack([_furthest(form, norm, d, *errors, FEW) for d in delta.tolist()], axis=1).reshape(len(x0), -1)
         for norm, delta in zip(norms, deltas, strict=True)
     ]
-    found = excursions(form, signal, norms, x0, np.concatenate(crowds, axis=1), stop)
+    found = excursions(form, signal, norms, x0, np.concatenate(crowds, axis=1), stop, FINE_STEP)
     own = np.split(found, np.cumsum([crowd.shape[1] for crowd in crowds])[:-1], axis=1)
     return [own[i][i].reshape(len(delta), -1).max(axis=1) for i, delta in enumerate(deltas)]
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, TypeVar
@@ -29,6 +30,7 @@ ROWS = 24  # of a table δ(ε)
 FIRST = 1e-3  # of the floor: what the smallest δ may add to it
 FLOOR = 1e-6  # of the motion: a smaller floor is not told from none
 CLOSE = 0.95  # of a δ that failed: near enough for a largest δ
+HUGE = 1e30  # beyond every δ, but those of a system that is linear
 MARGIN = 1e-6  # relative, by which claims stand off what was proved
 MAX_BYTES = 200_000_000
 THEOREM = (
@@ -116,10 +118,10 @@ def _claim(proof: Proof, norm: Norm, floor: float, scale: float) -> Claim:
     if not floor < np.inf:
         raise NotProvedError(f"no bound for all t in the {norm.name} norm")
     first = FIRST * floor / float(proof.decay.of(norm).max())
-    top = _largest(proof, norm, first, scale)
-    while True:  # once more: the bounds depend on the largest δ
+    top = _largest(proof, norm, first)
+    while True:  # once more: all together
         delta = np.geomspace(first, top, ROWS) * (1.0 - MARGIN)
-        epsilon = _epsilon(proof, norm, delta)
+        epsilon = proof.epsilon(norm, delta)
         if np.all(np.isfinite(epsilon)):
             break
         if not top > first:
@@ -128,32 +130,18 @@ def _claim(proof: Proof, norm: Norm, floor: float, scale: float) -> Claim:
     return Claim(norm, np.stack([np.maximum.accumulate(epsilon) * (1.0 + MARGIN), delta], axis=1))
 
 
-def _largest(proof: Proof, norm: Norm, first: float, scale: float) -> float:
-    """The largest δ ≥ first found to be proved: the last of ROWS of them, then of as many up to the next."""
-    top = max(16.0 * scale, 2.0 * first)
-    while True:
-        delta = np.geomspace(first, top, ROWS)
-        if proved := _proved(proof, norm, delta):
-            break
-        if not top > 2.0 * first:
-            raise NotProvedError(f"no delta > 0 in the {norm.name} norm")
-        top = max(top / 16.0, 2.0 * first)
-    if proved < ROWS:
-        delta = np.geomspace(delta[proved - 1], delta[proved], ROWS)
-        proved = max(_proved(proof, norm, delta), 1)
-    return float(delta[proved - 1])
-
-
-def _proved(proof: Proof, norm: Norm, delta: Array) -> int:
-    """How many of these rising δ are proved before the first that is not."""
-    return int(np.argmin(np.append(np.isfinite(_epsilon(proof, norm, delta)), False)))
-
-
-def _epsilon(proof: Proof, norm: Norm, delta: Array) -> Array:
-    try:
-        return proof.epsilon(norm, delta)
-    except NotProvedError:  # the box for the largest of them is too large
-        return np.full(len(delta), np.inf)
+def _largest(proof: Proof, norm: Norm, first: float) -> float:
+    """A δ ≥ first that is proved, while one at most 1/CLOSE times as large is not (or is above HUGE): by halving."""
+    if not proof.bounded(norm, first):
+        raise NotProvedError(f"no delta > 0 in the {norm.name} norm")
+    proved, failed = first, max(HUGE, 2.0 * first)
+    while not proved > CLOSE * failed:
+        delta = math.sqrt(proved) * math.sqrt(failed)
+        if proof.bounded(norm, delta):
+            proved = delta
+        else:
+            failed = delta
+    return proved
 
 
 def verify(certificate: Certificate, build: Build) -> Proof:

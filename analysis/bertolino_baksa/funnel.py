@@ -7,6 +7,7 @@ import numpy as np
 from .balls import Array, precision
 from .cells import errors
 from .growth import perturbed
+from .joint import largest
 from .norms import Norm
 from .proof import Proof
 
@@ -24,7 +25,7 @@ def funnel(proof: Proof, norm: Norm, delta: float) -> tuple[Array, Array]:
     with precision(2):
         bound = proof.majorant(rows.max(axis=0))
         top, _ = perturbed(metric, bound, proof.decay.width, proof.X, spread, np.zeros(1))
-        size = errors(proof.tube, metric, norm) + proof.decay.of(norm) * delta + metric.of(norm) * top[:, 0]
+        size = largest(proof.tube, metric, proof.decay, norm, np.array([delta]), top)[:, 0]
         single = [Norm("a state", row[None, :], largest=True) for row in np.eye(n)]
         e = np.stack([errors(proof.tube, metric, state) for state in single], axis=1)
     return size * (1.0 + 1e-9), (e + rows + top * metric.reach) * (1.0 + 1e-9)

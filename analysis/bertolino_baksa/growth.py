@@ -30,7 +30,7 @@ def perturbed(
     v0     : ‖q‖_S at the begin (K,).
     """
     n, S = len(metric.S), np.abs(metric.S)
-    v, largest = np.array(v0, dtype=float), np.empty((len(X), len(v0)))
+    v, largest = np.array(v0, dtype=float), np.full((len(X), len(v0)), np.inf)
     at_X = bound(X.T).T
     reach = np.concatenate([metric.reach, np.zeros(X.shape[1] - n)])[:, None]
 
@@ -44,6 +44,8 @@ def perturbed(
         largest[cell] = top
         v = (v * np.exp(-metric.alpha * width) + width * pushed) * (1.0 + 1e-12)
         v[~np.isfinite(top)] = np.inf
+        if not np.isfinite(v).any():
+            break
     return largest, v
 
 

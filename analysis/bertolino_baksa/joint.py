@@ -67,13 +67,14 @@ def furthest(e: Array, M: Array, delta: Array) -> Array:
     """
     U, s, Vt = np.linalg.svd(M)
     g = np.einsum("cji,cj->ci", U, e)
-    size, one = s[:, 0] + np.sqrt((e**2).sum(axis=1)), np.eye(M.shape[1])
+    top, size, one = s[:, 0], np.sqrt((e**2).sum(axis=1)), np.eye(M.shape[1])
     lacks_M = _frobenius(M - (U * s[:, None, :]) @ Vt)
     lacks_e = np.sqrt(((e - np.einsum("cij,cj->ci", U, g)) ** 2).sum(axis=1))
     stretch_U, stretch_V = (_frobenius(np.swapaxes(Q, 1, 2) @ Q - one) + EPS for Q in (U, np.swapaxes(Vt, 1, 2)))
-    far = np.maximum(delta * (1.0 + stretch_V[:, None]), APART * (size / s[:, 0])[:, None])  # (N, K); a δ of 0 as well
+    least = APART * size / top + np.finfo(float).tiny  # so that a δ of 0 has a μ as well
+    far = np.maximum(delta * (1.0 + stretch_V[:, None]), least[:, None])  # (N, K)
     value = _dual(g[:, None, :], s[:, None, :], far) * (1.0 + stretch_U)[:, None]
-    return np.asarray(value + (lacks_M + EPS * size)[:, None] * far + (lacks_e + EPS * size)[:, None])
+    return np.asarray(value + (lacks_M + EPS * top)[:, None] * far + (lacks_e + EPS * size)[:, None])
 
 
 def _frobenius(m: Array) -> Array:

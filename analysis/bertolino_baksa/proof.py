@@ -22,7 +22,7 @@ from .norms import Metric, Norm, usable_inverse
 from .tube import Off, Piece, Tube, at_end, followed, jumps, prove_tube
 
 SETTLED = 1e-3
-ROOM = 1.5  # of the box on which the equations are bounded, over the largest motion
+ROOM = 2.5  # of the box on which the equations are bounded, over the largest motion; 1.5 to 8 hardly change δ_max
 ROOM_INPUT = 10.0  # the same for inputs, so that a quiet motion under a large input is not taken for a large one
 
 UNDERFLOW = 1e-80  # squares that floats round to 0 make less than 1e-154, times sizes within `norms.RANGE`
@@ -57,17 +57,29 @@ class Proof:
     def epsilon(self, norm: Norm, delta: Array) -> Array:
         """ε (K,) for δ (K,) ≥ 0: N(x(0) − ψ(0)) ≤ δ implies N(x(t) − ψ(t)) ≤ ε for all t ≥ 0; inf if not proved.
 
-        ε(0) bounds the floor l. Raises NotProvedError for a norm that floats cannot compute.
+        ε(0) bounds the floor l. Raises NotProvedError for a norm that floats cannot compute, and where the equations have
+        no bound for the largest δ.
         """
+        top, later = self._rest(norm, delta)
+        on_pieces = largest(self.tube, self.metric, self.decay, norm, delta, top)
+        return np.maximum(on_pieces.max(axis=0), later) * (1.0 + 1e-9) + UNDERFLOW
+
+    def bounded(self, norm: Norm, delta: float) -> bool:
+        """Whether ε(δ) is finite, without what that takes no part in."""
+        try:
+            return bool(all(np.isfinite(found).all() for found in self._rest(norm, np.array([delta]))))
+        except NotProvedError:
+            return False
+
+    def _rest(self, norm: Norm, delta: Array) -> tuple[Array, Array]:
+        """Bounds (N, K) of ‖y − e^(At) y(0)‖_S over the cells, and (K,) of N(e + y) after the last piece."""
         usable_inverse(norm.T, f"matrix of the {norm.name} norm")
         rows = self.decay.rows(norm)
         bound = self.majorant(rows.max(axis=0) * delta.max())
         spread = np.zeros((*self.X.shape, len(delta)))
         spread[:, : self.system.n] = rows[:, :, None] * delta
         top, end = perturbed(self.metric, bound, self.decay.width, self.X, spread, np.zeros(len(delta)))
-        on_pieces = largest(self.tube, self.metric, self.decay, norm, delta, top)
-        later = self._later(norm, bound, self.decay.at_end(self.metric, norm) * delta + end)
-        return np.maximum(on_pieces.max(axis=0), later) * (1.0 + 1e-9) + UNDERFLOW
+        return top, self._later(norm, bound, self.decay.at_end(self.metric, norm) * delta + end)
 
     def settled(self, norm: Norm, floor: float) -> bool:
         """Whether longer pieces would lower this floor by less than SETTLED of it: the tail has no part in it."""
