@@ -20,7 +20,7 @@ from analysis.bertolino_baksa.certificate import Certificate, to_json
 from analysis.bertolino_baksa.funnel import ends, funnel
 from analysis.bertolino_baksa.proof import Proof
 from analysis.car import car_form, road_signal
-from analysis.certificates import certificate_command, certified_run
+from analysis.certificates import certificate_command, certificate_figures, certified_run
 from analysis.certificates.car_certificates import certify_car
 from analysis.certificates.certificate_figures import (
     Points,
@@ -60,6 +60,7 @@ def at_hand(made: Made, points: list[Points], monkeypatch: pytest.MonkeyPatch) -
     """What takes long was made before."""
     for module in (certificate_command, certified_run):
         monkeypatch.setattr(module, "certify_car", lambda parameters: made)
+    for module in (certificate_figures, certified_run):
         monkeypatch.setattr(module, "adversary_points", lambda certificate: points)
 
 
