@@ -31,9 +31,10 @@ from analysis.certificates.certificate_figures import (
     adversary_points,
     in_tube,
 )
+from analysis.certificates.directed import at_least
 from analysis.cosimulation import simulate
 from analysis.errors import InputError
-from analysis.figures import described, readable
+from analysis.figures import described
 from analysis.methods.linear_response import linear_response
 from analysis.reference import car_of, road_parameters
 from analysis.scenario import read_scenario
@@ -223,7 +224,7 @@ def test_a_certificate_of_another_car_or_road_is_refused(
 def test_certify_draws_delta_beside_the_certificate(made: Made, tmp_path: Path) -> None:
     assert main(["certify", "bump", "-o", str(tmp_path / "c.json")]) == 0
     title, caption = described((tmp_path / "c.svg").read_bytes(), "c.svg")
-    assert "how far" in title and f"δ_max = {readable(made[0].claims[0].largest_delta)}" in caption
+    assert "how far" in title and f"δ_max = {at_least(made[0].claims[0].largest_delta)}" in caption
     assert main(["certify", "bump", "-o", str(tmp_path / "c.svg")]) == 2
 
 
