@@ -5,20 +5,20 @@ All motions are integrated at once (Runge–Kutta of order 4 on the full equatio
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Sequence
 
 import numpy as np
 from scipy.linalg import expm
 
 from ..methods.linear_response import linear_response
+from ..methods.nonlinear_response import nonlinear_response
 from ..methods.signals import Piece, Signal
 from ..methods.standard_form import StandardForm
 from .balls import Array
 from .norms import Norm
 
-STEP, FINE_STEP = 5e-4, 2.5e-4  # s, at most
-SAMPLING = 5e-4  # s, of the true floor
+STEP = 5e-4  # s, at most
+TIGHT = 1e-12  # of the motion from x0 itself
 CANDIDATES = 64  # starts that the linear part proposes
 SPREAD = 8  # times as many are in the running: the best have neighbours nearly as good
 FEW = 12  # of them for a picture
@@ -33,11 +33,9 @@ def motions(
     form: StandardForm, signal: Signal, x0: Array, stop: float, step: float = STEP
 ) -> Iterator[tuple[float, Array]]:
     """(t, x (n, K)) of all motions from the starts x0 (n, K), step by step, from the signal's begin to `stop` [s]."""
-    edges = [t for t in signal.edges if t < stop] + [stop]
     x, ones = x0, np.ones(x0.shape[1])
-    yield edges[0], x
-    for piece, begin, end in zip(signal.pieces, edges, edges[1:], strict=False):
-        times = np.linspace(begin, end, int(np.ceil((end - begin) / step)) + 1)
+    yield signal.edges[0], x
+    for piece, times in _steps(signal, stop, step):
         for t, later in zip(times[:-1].tolist(), times[1:].tolist(), strict=True):
             h = later - t
             w0, w1, w2 = (piece(s)[:, None] * ones for s in (t, t + 0.5 * h, later))
@@ -49,36 +47,47 @@ def motions(
             yield later, x
 
 
+def _steps(signal: Signal, stop: float, step: float) -> Iterator[tuple[Piece, Array]]:
+    """Times from corner to corner, no further apart than `step`."""
+    edges = [t for t in signal.edges if t < stop] + [stop]
+    for piece, begin, end in zip(signal.pieces, edges, edges[1:], strict=False):
+        yield piece, np.linspace(begin, end, int(np.ceil((end - begin) / step)) + 1)
+
+
+def reference_error(form: StandardForm, signal: Signal, x0: Array, stop: float, step: float) -> tuple[Array, Array]:
+    """Times (N,) [s], those of `motions`, and e = x − x_lin (n, N) of the motion from x0 itself, tightly integrated."""
+    times = np.concatenate([[signal.edges[0]], *(times[1:] for _, times in _steps(signal, stop, step))])
+    x = nonlinear_response(form, x0, signal, times, rtol=TIGHT)
+    return times, x - linear_response(form.A, form.B, x0, signal, times)
+
+
+def _offsets(
+    form: StandardForm, signal: Signal, x0: Array, off: Array, stop: float, step: float = STEP
+) -> Iterator[Array]:
+    """x − x_lin (n, K) of the motions from x0 + off (n, K), at each time of `motions`; x_lin from x0.
+
+    It is e of the motion from x0 and the difference to that motion, in which Runge–Kutta's error at x0 drops out.
+    """
+    _, e = reference_error(form, signal, x0, stop, step)
+    starts = x0[:, None] + np.hstack([np.zeros((len(x0), 1)), off])
+    for (_, x), own in zip(motions(form, signal, starts, stop, step), e.T, strict=True):
+        yield x[:, 1:] - x[:, :1] + own[:, None]
+
+
 def excursions(
     form: StandardForm, signal: Signal, norms: Sequence[Norm], x0: Array, off: Array, stop: float, step: float = STEP
 ) -> Array:
     """sup N(x − x_lin) (norms, K) up to `stop` of the motions from x0 + off (n, K), x_lin from x0 (n,)."""
     found = np.zeros((len(norms), off.shape[1]))
-    rows = list(motions(form, signal, x0[:, None] + off, stop, step))
-    x_lin = linear_response(form.A, form.B, x0, signal, np.array([t for t, _ in rows]))
-    for (_, x), lin in zip(rows, x_lin.T, strict=True):
-        found = np.maximum(found, [norm(x - lin[:, None]) for norm in norms])
+    for each in _offsets(form, signal, x0, off, stop, step):
+        found = np.maximum(found, [norm(each) for norm in norms])
     return found
 
 
 def reference_floor(form: StandardForm, signal: Signal, norms: Sequence[Norm], x0: Array, stop: float) -> Array:
     """sup N(x − x_lin) (norms,) up to `stop` [s] of the motion from x0 itself, tightly integrated: the true floor."""
-    from scipy.integrate import solve_ivp  # takes a moment to import
-
-    times, e = [], []
-    edges, x = [t for t in signal.edges if t < stop] + [stop], np.asarray(x0, dtype=float)
-    for piece, begin, end in zip(signal.pieces, edges, edges[1:], strict=False):
-
-        def rate(t: float, y: Array, piece: Piece = piece) -> Sequence[float]:
-            return form.equations(y.tolist(), piece(t).tolist(), math.sin, math.cos)
-
-        at = np.linspace(begin, end, max(2, int((end - begin) / SAMPLING)))
-        solution = solve_ivp(rate, (begin, end), x, "DOP853", at, rtol=1e-11, atol=1e-16)
-        times.append(solution.t)
-        e.append(solution.y)
-        x = solution.y[:, -1]
-    off = np.concatenate(e, axis=1) - linear_response(form.A, form.B, x0, signal, np.concatenate(times))
-    return np.array([norm(off).max() for norm in norms])
+    _, e = reference_error(form, signal, x0, stop, STEP)
+    return np.array([norm(e).max() for norm in norms])
 
 
 def worst(
@@ -92,7 +101,7 @@ def worst(
     crowd = _furthest(form, norm, delta, *_errors(form, signal, x0, stop), CANDIDATES)
     best, at = 0.0, crowd[:, 0]
     for _ in range(rounds + 1):
-        _, off = _offsets(form, signal, x0, crowd, stop)
+        off = np.stack(list(_offsets(form, signal, x0, crowd, stop)), axis=1)
         sizes = norm(off)  # (times, K)
         if not sizes.max() > best:
             break
@@ -108,9 +117,10 @@ def _from_its_own_motion(
 ) -> Array:
     """Starts (n, few) furthest by the equations' derivatives along the motion from x0 + at, at its highest peaks."""
     small, inverse = DIFFERENCE * delta, np.linalg.inv(norm.T)
-    times, off = _offsets(form, signal, x0, at[:, None] + np.hstack([np.zeros((len(at), 1)), small * inverse]), stop)
+    beside = at[:, None] + np.hstack([np.zeros((len(at), 1)), small * inverse])
+    off = np.stack(list(_offsets(form, signal, x0, beside, stop)), axis=1)
     sizes = norm(off[:, :, 0])
-    peaks = [i for i in range(len(times)) if sizes[i] == sizes[max(i - 1, 0) : i + 2].max()]
+    peaks = [i for i in range(len(sizes)) if sizes[i] == sizes[max(i - 1, 0) : i + 2].max()]
     peaks = sorted(peaks, key=lambda i: -sizes[i])[:PEAKS]
     M = np.stack([norm.T @ (off[:, i, 1:] - off[:, i, :1]) / small for i in peaks])
     e = np.stack([norm.T @ off[:, i, 0] for i in peaks]) - M @ (norm.T @ at)
@@ -119,38 +129,26 @@ def _from_its_own_motion(
     return starts * delta / norm(starts)
 
 
-def _offsets(
-    form: StandardForm, signal: Signal, x0: Array, off: Array, stop: float, step: float = STEP
-) -> tuple[Array, Array]:
-    """Times (N,) and x − x_lin (n, N, K) of the motions from x0 + off (n, K), x_lin from x0."""
-    times, x = zip(*motions(form, signal, x0[:, None] + off, stop, step), strict=True)
-    x_lin = linear_response(form.A, form.B, x0, signal, np.array(times))
-    return np.array(times), np.stack(x, axis=1) - x_lin[:, :, None]
-
-
 def reached(
     form: StandardForm, signal: Signal, norms: Sequence[Norm], x0: Array, deltas: Sequence[Array], stop: float
 ) -> list[Array]:
     """For each norm, sup N(x − x_lin) (K,) up to `stop` [s] over starts at N(x(0) − x0) = its deltas (K,).
 
-    By FEW first starts like those of `worst`, without its rounds and all in one integration, in steps fine enough for
-    the floor as well.
+    By FEW first starts like those of `worst`, without its rounds and all in one integration.
     """
     errors = _errors(form, signal, x0, stop)
     crowds = [
         np.stack([_furthest(form, norm, d, *errors, FEW) for d in delta.tolist()], axis=1).reshape(len(x0), -1)
         for norm, delta in zip(norms, deltas, strict=True)
     ]
-    found = excursions(form, signal, norms, x0, np.concatenate(crowds, axis=1), stop, FINE_STEP)
+    found = excursions(form, signal, norms, x0, np.concatenate(crowds, axis=1), stop)
     own = np.split(found, np.cumsum([crowd.shape[1] for crowd in crowds])[:-1], axis=1)
     return [own[i][i].reshape(len(delta), -1).max(axis=1) for i, delta in enumerate(deltas)]
 
 
 def _errors(form: StandardForm, signal: Signal, x0: Array, stop: float) -> tuple[Array, Array]:
     """Times (N,) [s] and e (n, N) of the motion from x0 itself, at INSTANTS even times or so."""
-    times, e = _offsets(form, signal, x0, np.zeros((len(x0), 1)), min(stop, HORIZON))
-    few = slice(None, None, max(1, len(times) // INSTANTS))
-    return times[few], e[:, few, 0]
+    return reference_error(form, signal, x0, min(stop, HORIZON), min(stop, HORIZON) / INSTANTS)
 
 
 def _furthest(form: StandardForm, norm: Norm, delta: float, times: Array, e: Array, count: int) -> Array:
