@@ -96,7 +96,13 @@ def test_a_statement_says_which_car_road_gain_and_start() -> None:
     )
     assert second == "  without control"
     said = model_words({**model, "gain": gain})
-    assert len(said) == 6 and said[2].startswith("    u_fl = -(0.5 0 0")
+    assert len(said) == 6 and said[2] == "    u_fl = - 0.5 body.heave"
+    assert model_words({**model, "gain": [[0.0, -2.5, *[0.0] * 5, 1.0, *[0.0] * 6]] * 4})[2:] == [
+        f"    u_{corner} = + 2.5 body.roll - 1 der(body.heave)" for corner in ("fl", "fr", "rl", "rr")
+    ]
+    assert model_words({**model, "gain": np.zeros((4, 14)).tolist()})[2] == "    u_fl = 0"
+    flat = {"parameters": {"profile": "flat"}}
+    assert model_words(flat, road=False) == ["  car: the default", "  without control"]
     assert start_words(np.zeros(14)) == "from rest"
     assert start_words(0.25 * np.eye(14)[1]) == "from body.roll = 0.25 rad"
 

@@ -70,7 +70,7 @@ def command(parameters: Parameters, A: float, V: float | None, where: Path | Non
             top = largest(lambda A: found.under(heights(parameters, A, V)).motion(np.zeros(14)), A)
             print(f"  proved up to A = {at_least(top)} m")
     except NotProvedError as error:
-        print(f"no certificate: {error}")
+        print(f"no certificate of all these roads, perhaps of lower ones (a smaller A): {error}")
         return 1
     if where is not None:
         write_whole(where, to_json(certificate))
@@ -107,4 +107,4 @@ def statement(certificate: BoundedCertificate, driven: Driven) -> list[str]:
             f"{at_least(claim.table[0, 1])} (a worst road reaches {most:.4g} from rest: "
             f"ratio {claim.floor / most:.3g}); eps for larger delta: {table}"
         )
-    return [*lines, *model_words(certificate.model)]
+    return [*lines, *model_words(certificate.model, road=False)]

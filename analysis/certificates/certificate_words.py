@@ -49,20 +49,30 @@ def refuse_exceeded(claim: Claim, reached: float) -> None:
         )
 
 
-def model_words(model: Mapping[str, Any]) -> list[str]:
-    """The road's profile, what differs from the default in car and road, and what controls the car."""
+def model_words(model: Mapping[str, Any], *, road: bool = True) -> list[str]:
+    """The profile, unless claims are of many roads, what differs from the default, and what controls the car."""
     given = model["parameters"]
     said = {PROFILE.name: given.get(PROFILE.name, PROFILE.start)}
     if said[PROFILE.name] in ("bump", "sine", "step"):
         said["A"] = given.get("A", DEFAULTS["A"])
     said |= {name: value for name, value in given.items() if value != DEFAULTS[name]}
+    if not road:
+        said.pop(PROFILE.name)
     off = ", ".join(f"{name} = {_number(value)}{_unit(name)}" for name, value in said.items())
-    lines = [f"  car and road: {off}; the rest is the default"]
+    lines = [f"  {'car and road' if road else 'car'}: {f'{off}; the rest is the default' if off else 'the default'}"]
     if "gain" not in model:
         return [*lines, "  without control"]
     rows = zip(CORNERS, model["gain"], strict=True)
-    gains = [f"    u_{corner} = -({' '.join(_number(k) for k in row)}) x" for corner, row in rows]
+    gains = [f"    u_{corner} = {_force(row)}" for corner, row in rows]
     return [*lines, "  controlled at every instant t >= 0 by the forces [N] at the struts, x in SI units:", *gains]
+
+
+def _force(row: Sequence[float]) -> str:
+    """−row · x, by the names of the states."""
+    terms = " ".join(
+        f"{'-' if k > 0.0 else '+'} {_number(abs(k))} {q.name}" for k, q in zip(row, STATES, strict=True) if k
+    )
+    return terms or "0"
 
 
 def start_words(x0: Array) -> str:
