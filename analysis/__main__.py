@@ -16,7 +16,7 @@ from fmu_src.quantities import ParameterError
 from .certificates.verbs import add_verbs
 from .errors import CosimError, InputError
 from .scenario import built_in_scenarios, read_scenario
-from .trajectory import CERTIFICATE, FINDINGS, Run, new_run_folder, read_record, read_run, write_run
+from .trajectory import CERTIFICATE, FINDINGS, RECORD, Run, new_run_folder, read_record, read_run, write_run
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -59,8 +59,14 @@ def _parser() -> argparse.ArgumentParser:
     verb = verbs.add_parser("check", help="check the claims on a run and write its findings.json")
     what = "run folder, or FILE.csv that another tool wrote (its findings go to FILE.findings.json)"
     verb.add_argument("run", type=Path, metavar="RUN", help=what)
-    verb.add_argument("--road-class", metavar="CLASS", help="for a .csv: 'exact', the scenario's profile is the road")
-    verb.add_argument("--parameters", metavar="SCENARIO", help=f"for a .csv: its car and road: {scenario}")
+    classes = (
+        "for a .csv: 'exact', the scenario's profile is the road; or, with its heights as columns, 'curv:H2' "
+        "(|h''| <= H2 [m/s^2] between rows) or 'lip:H1' (|h'| <= H1 [m/s])"
+    )
+    verb.add_argument("--road-class", metavar="CLASS", help=classes)
+    verb.add_argument(
+        "--parameters", metavar="SCENARIO", help=f"for a .csv: its car and road: {scenario} (default: bump)"
+    )
     verb.set_defaults(do=_check)
 
     verb = verbs.add_parser("report", help="draw the figures of a run and write its report.html")
@@ -169,11 +175,17 @@ def _ride(options: argparse.Namespace) -> int:
     from .ride import ride, table
 
     rows = table([ride(read_run(folder)) for folder in options.runs])
-    print("| | unit |", " | ".join(folder.resolve().name for folder in options.runs), "|")
+    print("| | unit |", " | ".join(_headings(options.runs)), "|")
     print("|---|---|" + "---:|" * len(options.runs))
     for words, unit, values in rows:
         print(f"| {words} | {unit} |", " | ".join(f"{v:.3g}" if v == v else "not in this run" for v in values), "|")
     return 0
+
+
+def _headings(runs: list[Path]) -> list[str]:
+    """The folders' names, with those of a run that they lie in: `counterpart` alone says nothing."""
+    places = [folder.resolve() for folder in runs]
+    return [f"{p.parent.name}/{p.name}" if (p.parent / RECORD).is_file() else p.name for p in places]
 
 
 def _compare_fmus(scenario: str, run: Run) -> None:

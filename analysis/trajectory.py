@@ -165,6 +165,8 @@ def read_run(folder: Path) -> Run:
     """Read a run folder back, bit for bit."""
     if not folder.is_dir():
         raise InputError(f"{folder}: wanted a run folder (with {RECORD} and {CSV}), got no folder there")
+    if not any((folder / name).exists() for name in (RECORD, CSV)):
+        raise InputError(f"{folder}: wanted a run folder (with {RECORD} and {CSV}), got a folder with neither")
     return Run(trajectory=read_csv(folder / CSV), record=read_record(folder / RECORD))
 
 

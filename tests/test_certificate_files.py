@@ -45,6 +45,11 @@ def refuse(data: bytes) -> None:
         opened(data, "here", read)
 
 
+def test_an_altered_file_is_told_so_plainly() -> None:
+    with pytest.raises(InputError, match=r"^here: the content does not have the hash that it states"):
+        opened(motion().replace(b'"sha256": "', b'"sha256": "0'), "here", certificate_of)
+
+
 COMMON: list[Change] = [
     lambda c: c.update(theorem="All motions are stable."),
     lambda c: c.pop("theorem"),

@@ -186,6 +186,11 @@ def test_the_command_prints_the_table_of_runs(
     assert main(["ride", str(tmp_path / "bump-full-car"), str(tmp_path / "bump")]) == 0
     lines = capsys.readouterr().out.splitlines()
     assert lines[0] == "| | unit | bump-full-car | bump |"
+    inside = tmp_path / "bump" / "counterpart"
+    inside.mkdir()
+    write_run(runs["bump"], inside)
+    assert main(["ride", str(inside)]) == 0
+    assert capsys.readouterr().out.splitlines()[0] == "| | unit | bump/counterpart |"
     expected = table([rides["bump-full-car"], rides["bump"]])
     for line, (words, unit, values) in zip(lines[2:], expected, strict=True):
         assert line == f"| {words} | {unit} | {values[0]:.3g} | {values[1]:.3g} |"

@@ -219,6 +219,8 @@ def opened(data: bytes, where: str, read: Callable[[dict[str, Any]], Read]) -> R
         if stated != _hash(content):
             raise InputError(f"{where}: the content does not have the hash that it states: it was altered")
         return read(content)
+    except InputError:  # a ValueError too, which has said all
+        raise
     except (LookupError, TypeError, ValueError, AttributeError, RecursionError, ArithmeticError) as error:
         raise InputError(f"{where}: cannot be read as a certificate: {type(error).__name__}: {error}") from error
 

@@ -22,9 +22,11 @@ from ..bertolino_baksa.certificate import Certificate, certificate_of, opened, t
 from ..bertolino_baksa.proof import Proof
 from ..bertolino_baksa.tube import Tube
 from ..car import car_form, road_signal
+from ..errors import InputError
 from ..files import write_whole
 from ..methods.polynomials import Array
 from ..reference import Parameters, car_of, road_parameters
+from ..trajectory import CERTIFICATE
 from ..tyres import static_loads_of
 from .car_bounded_roads import statement as every_road
 from .car_certificates import build, car_norms, certify_car, prove_reference
@@ -68,7 +70,14 @@ def make_certificate(parameters: Parameters, where: Path | None, *, largest: boo
 
 def judge_certificate(path: Path) -> int:
     """Prove a certificate's claims anew; 0 if all are proved, 1 if not."""
-    certificate = opened(path.read_bytes(), str(path), _any_kind)
+    if path.is_dir():
+        inside = f"; {path / CERTIFICATE} is one" if (path / CERTIFICATE).is_file() else ""
+        raise InputError(f"{path}: wanted a certificate, got a folder{inside}")
+    try:
+        data = path.read_bytes()
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read: {error.strerror}") from error
+    certificate = opened(data, str(path), _any_kind)
     try:
         if isinstance(certificate, BoundedCertificate):
             lines = every_road(certificate, verify_bounded(certificate, build))

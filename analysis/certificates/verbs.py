@@ -38,6 +38,10 @@ def _certify(options: argparse.Namespace) -> int:
         return _certify_run(folder, options)
     if options.out and options.out.suffix == ".svg":
         raise InputError(f"-o {options.out}: wanted a name for the certificate, CERT.json; its figure is CERT.svg")
+    if options.out and options.out.is_dir():
+        raise InputError(f"-o {options.out}: wanted a name for the certificate, CERT.json, got a folder")
+    if options.out and not options.out.parent.is_dir():
+        raise InputError(f"-o {options.out}: there is no folder {options.out.parent}; make it first")
     scenario = read_scenario(options.scenario)
     if options.out and options.quick:
         raise InputError(f"-o {options.out}: --quick writes no certificate; leave it out")

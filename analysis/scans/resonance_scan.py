@@ -97,6 +97,8 @@ def _at(parameters: Parameters) -> tuple[Array, float, dict[Key, Resonance]]:
 def command(scenario: str, scanned: str | None, out: Path | None) -> int:
     """The verb `resonances`; returns the exit status."""
     parameters = read_scenario(scenario).parameters
+    if scanned is not None:
+        variation(scanned)  # refuses an unknown one before anything is computed
     table = table_of(parameters)
     print("\n".join(lines(table, parameters)))
     if scanned is None:
