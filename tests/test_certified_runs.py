@@ -221,6 +221,15 @@ def test_a_certificate_of_another_car_or_road_is_refused(
 
 
 @pytest.mark.usefixtures("at_hand")
+def test_certify_says_what_of_a_scenario_it_leaves_out(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (own := tmp_path / "own.toml").write_text('[start]\n"body.roll" = "1 deg"\n')
+    for scenario, said in ((str(own), True), ("bump", False)):
+        assert main(["certify", scenario]) == 0
+        told = capsys.readouterr().err
+        assert ("[start] is left out" in told, "certified without its controller" in told) == (said, said)
+
+
+@pytest.mark.usefixtures("at_hand")
 def test_certify_draws_delta_beside_the_certificate(made: Made, tmp_path: Path) -> None:
     assert main(["certify", "bump", "-o", str(tmp_path / "c.json")]) == 0
     title, caption = described((tmp_path / "c.svg").read_bytes(), "c.svg")

@@ -43,7 +43,7 @@ def make_certificate(parameters: Parameters, where: Path | None, *, largest: boo
 
     It is of the car without control: a controller of these parameters is left out, and that is said.
     """
-    if parameters.get("enabled", False):
+    if parameters.get("enabled", True):
         print("The car is certified without its controller; with it: --closed-loop.", file=sys.stderr)
     print("Finding and proving a reference motion ...", file=sys.stderr, flush=True)
     try:

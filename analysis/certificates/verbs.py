@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -45,6 +46,8 @@ def _certify(options: argparse.Namespace) -> int:
     scenario = read_scenario(options.scenario)
     if options.out and options.quick:
         raise InputError(f"-o {options.out}: --quick writes no certificate; leave it out")
+    if any(scenario.start.values()) and options.bounded is None:
+        print("[start] is left out: x_lin is that from rest; certify RUN takes a run's own start.", file=sys.stderr)
     if options.slope is not None and options.bounded is None:
         raise InputError(f"--slope {options.slope!r}: wanted --bounded with it")
     if options.bounded is not None:
