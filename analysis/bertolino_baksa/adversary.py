@@ -18,7 +18,7 @@ from .balls import Array
 from .norms import Norm
 
 STEP = 5e-4  # s, at most
-LAST = 3.0  # times 1/α
+LAST, LAST_OF_ENDLESS = 3.0, 8.0  # times 1/α after the last corner
 TIGHT = 1e-11  # of the motion from x0 itself
 CANDIDATES = 64  # starts that the linear part proposes
 SPREAD = 8  # times as many are in the running: the best have neighbours nearly as good
@@ -92,8 +92,9 @@ def reference_floor(form: StandardForm, signal: Signal, norms: Sequence[Norm], x
 
 
 def long_enough(form: StandardForm, signal: Signal) -> float:
-    """A time [s] by which the motion from x0 has been furthest off, or as good as: LAST/α after the last corner."""
-    return signal.edges[-1] + LAST / -float(np.linalg.eigvals(form.A).real.max())
+    """A time [s] by which the motion from x0 has been furthest off, or as good as; w may end or go on for ever."""
+    times = LAST if not signal.pieces[-1].amplitudes.any() else LAST_OF_ENDLESS
+    return signal.edges[-1] + times / -float(np.linalg.eigvals(form.A).real.max())
 
 
 def worst(
