@@ -6,6 +6,7 @@ d(T + V)/dt = Σ N ḣ + Σ u Δ̇ − Σ b Δ̇² − Σ bp (ḣ − ż_w)²
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from scipy.interpolate import CubicHermiteSpline
@@ -42,12 +43,14 @@ def kinetic_energy(car: Car, x: Array) -> Array:
     return 0.5 * (twice + (rear + car.m2) * dz2**2 + (rear * car.s2**2 + car.J2) * dpsi2**2)
 
 
-def tyre_heights(car: Car, x: Array) -> tuple[Array, Array]:
-    """Heights [m] of the four wheels (n, 4) over the road at rest, and their rates [m/s]."""
-    z11, z12, z2, psi2 = x[:, 3:7].T
-    dz11, dz12, dz2, dpsi2 = x[:, 10:14].T
-    tilt, dtilt = car.s2 * np.sin(psi2), car.s2 * np.cos(psi2) * dpsi2
-    return np.column_stack([z11, z12, z2 + tilt, z2 - tilt]), np.column_stack([dz11, dz12, dz2 + dtilt, dz2 - dtilt])
+def tyre_heights(car: Car, q: Any, v: Any, sin: Any, cos: Any) -> tuple[list[Any], list[Any]]:
+    """Heights (4) [m] of the wheels over the road at rest, and their rates [m/s], from q (7) and v = q̇ (7).
+
+    In numbers of any kind that `sin` and `cos` take.
+    """
+    (z11, z12, z2, psi2), (dz11, dz12, dz2, dpsi2) = q[3:], v[3:]
+    tilt, dtilt = car.s2 * sin(psi2), car.s2 * cos(psi2) * dpsi2
+    return [z11, z12, z2 + tilt, z2 - tilt], [dz11, dz12, dz2 + dtilt, dz2 - dtilt]
 
 
 def strut_rates(car: Car, x: Array) -> Array:
@@ -63,7 +66,7 @@ def balance(car: Car, trajectory: Trajectory) -> Balance:
     """
     t, step, road = trajectory.time, np.diff(trajectory.time), recorded_road(trajectory)
     x, h, u, travel = (trajectory.columns([q.name for q in table]) for table in _TABLES)
-    heights, rates = tyre_heights(car, x)
+    heights, rates = map(np.column_stack, tyre_heights(car, x[:, :7].T, x[:, 7:].T, np.sin, np.cos))
     c, cp = np.array([car.c1, car.c1, car.c2, car.c2]), np.array([car.cp1, car.cp1, car.cp2, car.cp2])
     b, bp = np.array([car.b1, car.b1, car.b2, car.b2]), np.array([car.bp1, car.bp1, car.bp2, car.bp2])
     energy = kinetic_energy(car, x) + 0.5 * (travel**2 @ c + (h - heights) ** 2 @ cp)

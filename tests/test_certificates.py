@@ -51,9 +51,15 @@ def test_the_floor_on_the_bump_is_within_one_per_cent_of_the_truth(A: float) -> 
         assert floor < claim.floor <= 1.01 * floor
 
 
-@pytest.mark.parametrize("Lambda", [1.0, 8.0], ids=["10 Hz", "1.25 Hz"])
-def test_the_floor_on_an_endless_road_is_within_two_per_cent_of_the_truth(Lambda: float) -> None:
-    parameters = {"profile": "sine", "Lambda": Lambda}
+ENDLESS = {
+    "10 Hz": {"profile": "sine", "Lambda": 1.0},
+    "1.25 Hz": {"profile": "sine", "Lambda": 8.0},
+    "Fourier": dict(read_scenario("fourier-fl").parameters),
+}
+
+
+@pytest.mark.parametrize("parameters", ENDLESS.values(), ids=ENDLESS)
+def test_the_floor_on_an_endless_road_is_within_two_per_cent_of_the_truth(parameters: dict[str, Any]) -> None:
     certificate, proof = certify_car(parameters)
     assert proof.repetition is not None
     true = reference_floor(*system(parameters), [c.norm for c in certificate.claims], REST, 9.0)

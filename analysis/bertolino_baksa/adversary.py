@@ -18,7 +18,8 @@ from .balls import Array
 from .norms import Norm
 
 STEP = 5e-4  # s, at most
-TIGHT = 1e-12  # of the motion from x0 itself
+LAST, LAST_OF_ENDLESS = 3.0, 8.0  # times 1/α after the last corner
+TIGHT = 1e-11  # of the motion from x0 itself
 CANDIDATES = 64  # starts that the linear part proposes
 SPREAD = 8  # times as many are in the running: the best have neighbours nearly as good
 FEW = 12  # of them for a picture
@@ -88,6 +89,12 @@ def reference_floor(form: StandardForm, signal: Signal, norms: Sequence[Norm], x
     """sup N(x − x_lin) (norms,) up to `stop` [s] of the motion from x0 itself, tightly integrated: the true floor."""
     _, e = reference_error(form, signal, x0, stop, STEP)
     return np.array([norm(e).max() for norm in norms])
+
+
+def long_enough(form: StandardForm, signal: Signal) -> float:
+    """A time [s] by which the motion from x0 has been furthest off, or as good as; w may end or go on for ever."""
+    times = LAST if not signal.pieces[-1].amplitudes.any() else LAST_OF_ENDLESS
+    return signal.edges[-1] + times / -float(np.linalg.eigvals(form.A).real.max())
 
 
 def worst(

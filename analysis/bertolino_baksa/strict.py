@@ -28,6 +28,8 @@ def _once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
 
 def _held(text: str) -> float:
     value = float(text)
+    if repr(value) == text:
+        return value
     try:
         held = Decimal(text) == Decimal(repr(value))
     except InvalidOperation:  # an exponent beyond all measure

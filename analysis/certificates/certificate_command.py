@@ -10,9 +10,8 @@ from typing import Any
 import numpy as np
 
 from fmu_src.quantities import CORNER_WORDS, PARAMETERS, STATES
-from fmu_src.vehicle.equations import equations_of_motion
 
-from ..bertolino_baksa.adversary import reference_floor
+from ..bertolino_baksa.adversary import long_enough, reference_floor
 from ..bertolino_baksa.balls import NotProvedError, precision
 from ..bertolino_baksa.bounded_certificate import KIND, BoundedCertificate
 from ..bertolino_baksa.bounded_certificate import certificate_of as bounded_of
@@ -22,6 +21,7 @@ from ..bertolino_baksa.certificate import Certificate, certificate_of, opened, t
 from ..bertolino_baksa.proof import Proof
 from ..bertolino_baksa.tube import Tube
 from ..car import car_form, road_signal
+from ..energy import tyre_heights
 from ..errors import InputError
 from ..files import write_whole
 from ..methods.polynomials import Array
@@ -104,8 +104,9 @@ def statement(certificate: Certificate, proof: Proof) -> list[str]:
     model = certificate.model
     claims = named_by_content(certificate.claims, car_norms(model["parameters"]))
     form = car_form(car_of(model["parameters"]), gain=np.array(model["gain"]) if "gain" in model else None)
-    signal, end = road_signal(road_parameters(model["parameters"])), float(certificate.pieces[-1].end)
-    true = reference_floor(form, signal, [c.norm for c in claims], certificate.x0, end)
+    signal = road_signal(road_parameters(model["parameters"]))
+    stop = min(float(certificate.pieces[-1].end), long_enough(form, signal))
+    true = reference_floor(form, signal, [c.norm for c in claims], certificate.x0, stop)
     start = start_words(certificate.x0)
     lines = [f"x_lin {start} is almost stable (definition 2.1): for all t >= 0 and every eps >= l,"]
     for claim, floor in zip(claims, true.tolist(), strict=True):
@@ -146,10 +147,15 @@ def _along(parameters: Parameters, proof: Proof, start: str) -> list[str]:
 
 def _loads(parameters: Parameters, proof: Proof, tube: Tube) -> Array:
     """Smallest loads (4,) [N] of the tyres in a tube."""
-    motion = equations_of_motion(exact_car(car_of(parameters)), lambda x: x.sin(), lambda x: x.cos())
+    car = exact_car(car_of(parameters))
+    cp, bp = (car.cp1, car.cp1, car.cp2, car.cp2), (car.bp1, car.bp1, car.bp2, car.bp2)
 
-    def forces(x: Sequence[object], w: Sequence[object], sin: object, cos: object) -> Sequence[object]:
-        return motion(x[:7], x[7:], [0.0] * 4, w[:4], w[4:])[2]
+    def forces(x: Sequence[Any], w: Sequence[Any], sin: Any, cos: Any) -> list[Any]:
+        heights, rates = tyre_heights(car, x[:7], x[7:], sin, cos)
+        return [
+            c * (h - height) + b * (dh - rate)
+            for c, b, h, dh, height, rate in zip(cp, bp, w[:4], w[4:], heights, rates, strict=True)
+        ]
 
     with precision(2):
         return outputs(proof.system, tube, proof.metric, forces)[0] + static_loads_of(car_of(parameters))

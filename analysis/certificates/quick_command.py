@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..bertolino_baksa.adversary import reference_floor
+from ..bertolino_baksa.adversary import long_enough, reference_floor
 from ..bertolino_baksa.balls import NotProvedError, precision
 from ..bertolino_baksa.norms import proved_metric
 from ..bertolino_baksa.quick import quick_floors
@@ -28,8 +28,7 @@ def quick_answer(parameters: Parameters) -> int:
     except NotProvedError as error:
         print(f"no quick answer: {error}")
         return 1
-    slowest = 1.0 / -float(np.linalg.eigvals(form.A).real.max())
-    true = reference_floor(form, signal, named, np.zeros(14), min(float(end), signal.edges[-1] + slowest))
+    true = reference_floor(form, signal, named, np.zeros(14), min(float(end), long_enough(form, signal)))
     print("for all t >= 0 the motion from rest stays within l of x_lin:")
     for norm, floor, least in zip(named, floors, true.tolist(), strict=True):
         coarse = f"{floor / least:.2g} times what a reference motion reaches" if least else "a reference motion: 0"
