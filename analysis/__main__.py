@@ -227,7 +227,7 @@ def _judge(run: Run, folder: Path) -> int:
         found, why_not = judged(run)
         findings += found
         if why_not:
-            print(f"{name}: not all is compared with the run: {why_not}", file=sys.stderr)
+            print(f"{name}: not compared with the run, or not all: {why_not}", file=sys.stderr)
     write_findings(findings, folder / FINDINGS)
     for f in findings:
         print(f.line)

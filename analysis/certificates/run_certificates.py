@@ -91,7 +91,7 @@ def _on_its_road(run: Run, export: Export, file: str) -> tuple[list[Finding], st
     expected, e, off = found.at(t)
     rows = judged(export.x, expected, off + export.digits + export.own * scales(expected), e)
     bound = found.largest_error(energy_norm(car_of(parameters)))
-    return [*findings, _of_rows(export, rows, file), _between_rows(run, export, rows, bound, "this road")], ""
+    return [*findings, _of_rows(export, rows, file), _between_rows(run, export, rows, bound, None)], ""
 
 
 def _on_roads(
@@ -106,7 +106,7 @@ def _on_roads(
         return findings, str(error)
     rows = everywhere.rows(export.x, allowed)
     bound = everywhere.found.largest_error(energy_norm(car_of(run.parameters)))
-    between = _between_rows(run, export, rows, bound, f"every road of class {roads} on which a motion has these rows")
+    between = _between_rows(run, export, rows, bound, roads)
     return [*findings, _of_rows(export, rows, file), between], ""
 
 
@@ -194,11 +194,16 @@ def _of_rows(export: Export, rows: Rows, file: str) -> Finding:
     )
 
 
-def _between_rows(run: Run, export: Export, rows: Rows, bound: float, road: str) -> Finding:
-    """The bound is of the exact motion; the run's own error comes on top of it at its rows."""
+def _between_rows(run: Run, export: Export, rows: Rows, bound: float, roads: RoadClass | None) -> Finding:
+    """The bound is of the exact motion; the run's own error comes on top of it at its rows.
+
+    On a class of roads x − x_lin is compared along the chords of the heights, and that of each road bounded.
+    """
+    road = f"every road of class {roads} on which a motion has these rows" if roads else "this road"
     norm = energy_norm(car_of(run.parameters))
     seen, last = float(norm(rows.e.T).max()), export.times[-1]
     own = float(np.linalg.norm(np.abs(norm.T) @ rows.allowed.max(axis=0)))
+    rest = "the run's integrator and printed digits" + (", and what the class leaves open of x_lin" if roads else "")
     return Finding(
         claim=f"until t = {last:g} s the run is as near x_lin as is proved of its motion, between the rows too: "
         "largest N(x - x_lin) at a row, N the energy norm, to which the run's own error may add",
@@ -208,5 +213,5 @@ def _between_rows(run: Run, export: Export, rows: Rows, bound: float, road: str)
         tolerance=bound + own,
         unit="J^0.5",
         source=f"proved on {road} of the exact motion until t = {last:g} s: {at_most(bound, 6)}, of which it reaches "
-        f"{seen:.6g} at the rows; the rest of the tolerance, {own:.2g}, is the run's integrator and printed digits",
+        f"{seen:.6g} at the rows; the rest of the tolerance, {own:.2g}, is {rest}",
     )
