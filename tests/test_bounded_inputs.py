@@ -8,9 +8,11 @@ from typing import Any
 import numpy as np
 import pytest
 from flint import arb, fmpq
+from scipy.linalg import expm
 from test_almost_stable import Equations, build, cubic, duffing, pendulum, quiet
 
 from analysis.__main__ import main
+from analysis.bertolino_baksa import bounded_inputs
 from analysis.bertolino_baksa.adversary import motions
 from analysis.bertolino_baksa.balls import ExactSystem, NotProvedError, precision
 from analysis.bertolino_baksa.bounded_certificate import (
@@ -24,7 +26,7 @@ from analysis.bertolino_baksa.bounded_inputs import Bounds, Gains, gains, reache
 from analysis.bertolino_baksa.certificate import opened
 from analysis.bertolino_baksa.norms import Norm, euclid, modal_metric, proved_metric, weighted_sup
 from analysis.car import car_form
-from analysis.certificates.car_bounded_roads import car_gains, heights
+from analysis.certificates.car_bounded_roads import car_gains, heights, highest
 from analysis.certificates.exact_car import norms
 from analysis.errors import InputError
 from analysis.methods.signals import Piece, Signal
@@ -82,6 +84,17 @@ def test_no_input_gets_beyond_and_the_worst_comes_near(equations: Equations) -> 
                 tuple(Piece(0.4 * k, np.zeros(1, complex), np.array([[v + 0j]])) for k, v in enumerate(values))
             )
             assert max(norm(x).max() for _, x in motions(form, signal, off, 16.0, 0.02)) < wider
+
+
+def test_what_a_start_does_after_the_last_cell_is_bounded_too(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Cells up to 0.4 s of x'' + x' + 4x = 0, whose velocity is largest later: both bounds are of all times."""
+    monkeypatch.setattr(bounded_inputs, "LONG", 0.05)
+    found, form = textbook(duffing, 2)
+    flow = np.array([expm(form.A * t) for t in np.linspace(0.0, 10.0, 1000)])
+    with precision(2):
+        assert found.decay.width.sum() < 0.4
+        assert (found.spread(euclid(2)) >= np.linalg.norm(flow, axis=2).max(axis=0)).all()
+        assert found.kappa(euclid(2)) >= np.linalg.norm(flow, 2, axis=(1, 2)).max()
 
 
 def tied(model: dict[str, float]) -> ExactSystem:
@@ -161,6 +174,19 @@ def test_every_road_under_the_car() -> None:
             assert (states <= driven.states * (1.0 + 1e-6)).all()
             assert states[5] < share * driven.states[5] * (1.0 + 1e-6)
     assert floor / 1.1 < reached(form, norm, bounds, worst_inputs(form, norm, bounds)) < floor
+
+
+def test_up_to_the_largest_height_that_is_printed_there_is_a_certificate() -> None:
+    """Of starts off ψ = 0 as well: the motion from rest alone is bounded a little further."""
+    with precision(2):
+        found = car_gains({})
+        top = highest(found, {}, 0.02, None)
+        driven = found.under(heights({}, top))
+        made = certify({}, driven, norms(Car(), driven.states[:, None]))
+        assert min(claim.largest_delta for claim in made.claims) > 0.0
+        with pytest.raises(NotProvedError):
+            beyond = found.under(heights({}, 1.02 * top))
+            certify({}, beyond, norms(Car(), beyond.states[:, None]))
 
 
 def test_roads_that_cannot_be_are_refused(capsys: pytest.CaptureFixture[str]) -> None:

@@ -4,17 +4,21 @@ from __future__ import annotations
 
 import dataclasses
 import math
+from collections.abc import Sequence
 from itertools import pairwise
 from typing import Any
 
 import numpy as np
 import pytest
+from flint import arb, arb_mat, fmpq
 from scipy.integrate import solve_ivp
 
 from analysis.bertolino_baksa.adversary import excursions
-from analysis.bertolino_baksa.balls import Array, NotProvedError, precision
+from analysis.bertolino_baksa.balls import Array, ExactSystem, NotProvedError, precision
 from analysis.bertolino_baksa.certificate import Certificate, Claim, from_json, to_json, verify
-from analysis.bertolino_baksa.norms import Norm
+from analysis.bertolino_baksa.norms import Norm, euclid
+from analysis.bertolino_baksa.switched import measured, phases
+from analysis.bertolino_baksa.taylor import find_pieces
 from analysis.car import actuators, car_equations, car_form, road_signal
 from analysis.certificates.car_certificates import build
 from analysis.certificates.closed_loop_certificate import both, comparison, infinite_gain
@@ -112,3 +116,22 @@ def test_the_gain_by_time_is_certified_on_its_horizon_and_after_it() -> None:
     true = largest_error(np.zeros(14), 0.4, 1e-9)
     assert true < floor < 1.01 * true
     assert largest_error(start[:, 0], 2.4, 1e-6) < epsilon
+
+
+@pytest.mark.parametrize(("ends", "proved"), [(1, True), (3, False), (None, False)])
+def test_a_tube_by_phases_is_refused_where_the_input_goes_on_after_it(ends: int | None, proved: bool) -> None:
+    """x' = −x + w, w = 1 up to `ends` [s], pieces up to 2 s: what is said of all later times needs w = 0 there."""
+
+    def equations(x: Sequence[Any], w: Sequence[Any], sin: Any, cos: Any) -> list[Any]:
+        return [w[0] - x[0]]
+
+    begins = [(fmpq(0), lambda t: [arb(1)]), *([] if ends is None else [(fmpq(ends), lambda t: [arb(0)])])]
+    with precision(2):
+        system = ExactSystem(1, 1, equations, tuple(begins), fmpq(0))
+        switched = phases(system, equations, lambda x, w: arb_mat([[0]]), [fmpq(0)], [np.eye(1)])
+        pieces = find_pieces(system, [0.0], fmpq(2))
+        if proved:
+            assert measured(switched, pieces).epsilon(euclid(1), 0.1) < 0.1001
+        else:
+            with pytest.raises(NotProvedError, match="not proved to be 0"):
+                measured(switched, pieces)

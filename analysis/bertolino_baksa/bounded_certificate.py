@@ -61,14 +61,24 @@ def largest(proved: Callable[[float], object], first: float) -> float:
     return good
 
 
-def claim(driven: Driven, norm: Norm) -> Claim:
-    """δ(ε) up to the largest δ that is found. Raises NotProvedError if there is none."""
-    spread = driven.gains.spread(norm)
+def smallest(driven: Driven, norm: Norm) -> tuple[float, float]:
+    """l, and the smallest δ of the table, which adds but FIRST to it. Raises NotProvedError if that δ is not proved."""
     floor = driven.epsilon(norm, [0.0])[0]
+    first = FIRST * floor / driven.gains.kappa(norm)
+    try:
+        driven.motion(driven.gains.spread(norm) * (CLOSE * first))  # so that `largest` finds more than `first`
+    except NotProvedError as error:
+        raise NotProvedError(f"no delta of {first:.3g} or more in the {norm.name} norm: {error}") from error
+    return floor, first
+
+
+def claim(driven: Driven, norm: Norm) -> Claim:
+    """δ(ε) up to the largest δ that is found; raises as `smallest`."""
+    floor, first = smallest(driven, norm)
+    spread = driven.gains.spread(norm)
     top = largest(lambda delta: driven.motion(spread * delta), floor)
-    first = FIRST * floor / float(driven.gains.decay.of(norm).max())
     if not top > first:
-        raise NotProvedError(f"no delta > 0 in the {norm.name} norm")
+        raise NotProvedError(f"no delta of {first:.3g} or more in the {norm.name} norm")
     delta = np.array([first, *(share * top for share in SHARES if share * top > first)])
     epsilon = np.array(driven.epsilon(norm, delta.tolist()))
     return Claim(norm, np.stack([np.maximum.accumulate(epsilon) * (1.0 + MARGIN), delta * (1.0 - MARGIN)], axis=1))

@@ -72,8 +72,14 @@ class Gains:
         return Driven(self, bounds, self.driven(np.eye(self.system.n), bounds))
 
     def spread(self, norm: Norm) -> Array:
-        """κ_j (n,) ≥ sup_t |(e^(At) y)_j|/N(y)."""
-        return np.asarray(self.decay.rows(norm).max(axis=0))
+        """κ_j (n,) ≥ sup_t |(e^(At) y)_j|/N(y), by ‖·‖_S after the last cell."""
+        later = self.metric.reach * self.decay.at_end(self.metric, norm) * (1.0 + STRICT)
+        return np.maximum(self.decay.rows(norm).max(axis=0), later)
+
+    def kappa(self, norm: Norm) -> float:
+        """κ ≥ sup_t N(e^(At) y)/N(y), by ‖·‖_S after the last cell."""
+        later = self.metric.of(norm) * self.decay.at_end(self.metric, norm) * (1.0 + STRICT)
+        return max(float(self.decay.of(norm).max()), later)
 
 
 @dataclass(frozen=True, slots=True)
@@ -111,7 +117,7 @@ class Driven:
         """
         usable_inverse(norm.T, f"matrix of the {norm.name} norm")
         gains = self.gains
-        spread, kappa = gains.spread(norm), float(gains.decay.of(norm).max())
+        spread, kappa = gains.spread(norm), gains.kappa(norm)
         driven = gains.driven(norm.T, self.bounds)
         by_rates = gains.decay.integral(gains.metric, norm.T, matrix(np.eye(gains.system.n)))
         found = []

@@ -7,6 +7,7 @@ that bounds δ(ε) by norms alone, which is coarse where δ dominates, and as sh
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -46,7 +47,7 @@ class Phase:
 
 @dataclass(frozen=True, slots=True)
 class Switched:
-    """A system whose linear part is `linear`(x, w, sin, cos), and its phases; from the last on A is constant, w = 0.
+    """A system whose linear part is `linear`(x, w, sin, cos), and its phases; A is constant, w = 0 after the pieces.
 
     excess : ∂F/∂x − A over balls x and w, with A's own change over w left out of the difference.
     """
@@ -144,6 +145,9 @@ def measured(switched: Switched, pieces: Sequence[Piece]) -> Measured:
     system, begins = switched.linear_system, [phase.begin for phase in switched.phases]
     if pieces[0].begin != 0 or pieces[-1].end <= begins[-1]:
         raise NotProvedError("the pieces do not reach from 0 into the last phase")
+    corner, rest = switched.system.pieces[-1]
+    if pieces[-1].end < corner or not all(w == 0 for w in rest(arb(0, math.inf))):
+        raise NotProvedError("after the last piece the input is not proved to be 0")
     which, defects, mus = [], [], []
     refuse_gaps(pieces)
     for k, piece in enumerate(pieces):

@@ -12,7 +12,7 @@ import numpy as np
 from fmu_src.quantities import STATES
 
 from ..bertolino_baksa.balls import NotProvedError, precision
-from ..bertolino_baksa.bounded_certificate import BoundedCertificate, certify, largest, to_json
+from ..bertolino_baksa.bounded_certificate import CLOSE, BoundedCertificate, certify, largest, smallest, to_json
 from ..bertolino_baksa.bounded_inputs import Bounds, Driven, Gains, gains, reached, worst_inputs
 from ..bertolino_baksa.norms import proved_metric
 from ..car import car_form
@@ -57,6 +57,24 @@ def heights(parameters: Parameters, A: float, V: float | None = None) -> Bounds:
     return Bounds(np.array([A] * 4 + [0.0] * 4))
 
 
+def highest(found: Gains, parameters: Parameters, A: float, V: float | None) -> float:
+    """Largest A [m] that is found with a δ > 0 in every norm; at least `A`, for which that is known."""
+
+    def driven(A: float) -> Driven:
+        return found.under(heights(parameters, A, V))
+
+    top = largest(lambda A: driven(A).motion(np.zeros(14)), A)  # from rest alone, which is quicker
+    while top > A:
+        each = driven(top)
+        try:
+            for norm in norms(car_of(parameters), each.states[:, None]):
+                smallest(each, norm)
+            return top
+        except NotProvedError:
+            top /= CLOSE
+    return A
+
+
 def command(parameters: Parameters, A: float, V: float | None, where: Path | None) -> int:
     """Print what is proved of all roads of |h| ≤ A [m] (|ḣ| ≤ V [m/s]), write it; 0, or 1 if nothing is."""
     bounds = heights(parameters, A, V)
@@ -67,8 +85,7 @@ def command(parameters: Parameters, A: float, V: float | None, where: Path | Non
             certificate = certify(flat(parameters), driven, norms(car_of(parameters), driven.states[:, None]))
             for line in statement(certificate, driven):
                 print(line, flush=True)
-            top = largest(lambda A: found.under(heights(parameters, A, V)).motion(np.zeros(14)), A)
-            print(f"  proved up to A = {at_least(top)} m")
+            print(f"  proved up to A = {at_least(highest(found, parameters, A, V))} m")
     except NotProvedError as error:
         print(f"no certificate of all these roads, perhaps of lower ones (a smaller A): {error}")
         return 1
