@@ -137,7 +137,9 @@ def test_repeating_a_run_from_its_run_json_gives_the_same_bytes(work: Path) -> N
 def test_an_honest_run_passes_the_check_and_gets_its_findings(work: Path) -> None:
     done = command(work, "check", "run")
     assert done.returncode == 0
-    assert done.stderr.startswith("averaging: not compared with the run, or not all: the road changes its form until 0.32 s")
+    assert done.stderr.startswith(
+        "averaging: not compared with the run, or not all: the road changes its form until 0.32 s"
+    )
     findings = json.loads((work / "run" / "findings.json").read_text(encoding="utf-8"))
     assert [finding["holds"] for finding in findings] == [True] * len(done.stdout.splitlines())
     assert all(line.startswith("holds: ") for line in done.stdout.splitlines())

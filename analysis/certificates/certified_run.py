@@ -120,6 +120,6 @@ def _stays(claim: Claim, x: Array, off: Array, own: float) -> Finding:
         expected=0.0,
         tolerance=epsilon + error,
         unit={"energy": "J^0.5", "weighted sup": "1"}.get(claim.norm.name, "SI"),
-        source=f"{CERTIFICATE}; start {start:.4g} off; certified of the exact motion {at_most(epsilon, 6)}, the run's own "
-        f"error adds up to {error:.2g}",
+        source=f"{CERTIFICATE}; start {start:.4g} off; certified of the exact motion {at_most(epsilon, 6)}, to which "
+        f"the run's own error adds up to {error:.2g}",
     )

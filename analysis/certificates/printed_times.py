@@ -1,7 +1,7 @@
 """Times that an export prints to a few digits: a row is of a motion at another time than it says, by a little.
 
-What a motion can do in that little time is taken for a part of what the rows' own digits leave open: proofs then hold
-at the times as they are printed.
+What a motion can do in that little time counts as a part of what the rows' own digits leave open. ROOM is a margin for
+what is not linear, no enclosure: proofs from such a file rest on it, those from exact times do not.
 """
 
 from __future__ import annotations

@@ -74,7 +74,8 @@ def certified_findings(
         return _on_its_road(run, Export(t, x, open_, more, more_open, own_error(run)), file)
     heights, road_open = of([q.name for q in ROAD_HEIGHTS])
     rates = steepest(t, late, heights, road_open, roads.bound, roads.kind == "curv")
-    road_open = road_open + late[:, None] * rates
+    # A corner may lie beside its row by as much as the time is late: the height is then off the chord once more.
+    road_open = road_open + (2.0 if roads.kind == "curv" else 1.0) * late[:, None] * rates
     w, loose = np.hstack([heights, np.zeros_like(rates)]), np.hstack([road_open, rates])
     export = Export(t, x, open_ + moved(form, x, open_, late, w, loose), more, more_open, own_error(run))
     return _on_roads(run, export, file, roads, heights, road_open)
