@@ -89,8 +89,8 @@ def on_horizon(parameters: Parameters, norms: Sequence[Norm]) -> list[str]:
     except NotProvedError as error:
         return [f"no certificate with the gain by time on its horizon: {error}"]
     lines = [
-        f"with the gain by time from {control.begin:g} to {control.end:g} s and no control after, for all t >= 0, x_lin under it "
-        "(delta by tubes alone, with control and without: less than is proved above):"
+        f"with the gain by time from {control.begin:g} to {control.end:g} s and no control after, for all t >= 0 "
+        "(x_lin under it; delta by tubes alone, with control and without: less than is proved above):"
     ]
     for norm in norms:
         with precision(2):
