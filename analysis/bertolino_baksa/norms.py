@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -38,7 +39,7 @@ def weighted_sup(weights: Array) -> Norm:
     return Norm("weighted sup", np.diag(1.0 / np.asarray(weights)), largest=True)
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Metric:
     """‖x‖_S = ‖S x‖₂, in which x' = A x shrinks: d‖x‖_S/dt ≤ −alpha ‖x‖_S, proved for the exact A."""
 
@@ -47,7 +48,7 @@ class Metric:
     A: arb_mat  # balls around the exact A
     alpha: float
 
-    @property
+    @cached_property
     def reach(self) -> Array:
         """n_j ≥ |x_j|/‖x‖_S (n,)."""
         return np.sqrt((magnitudes(self.inverse) ** 2).sum(axis=1)) * (1.0 + 1e-14)
