@@ -39,13 +39,22 @@ def motions(
     for piece, times in _steps(signal, stop, step):
         for t, later in zip(times[:-1].tolist(), times[1:].tolist(), strict=True):
             h = later - t
-            w0, w1, w2 = (piece(s)[:, None] * ones for s in (t, t + 0.5 * h, later))
-            k1 = form.rate(x, w0)
-            k2 = form.rate(x + 0.5 * h * k1, w1)
-            k3 = form.rate(x + 0.5 * h * k2, w1)
-            k4 = form.rate(x + h * k3, w2)
-            x = x + h / 6.0 * (k1 + 2.0 * (k2 + k3) + k4)
+            x = stepped(form, x, h, *(piece(s)[:, None] * ones for s in (t, t + 0.5 * h, later)))
             yield later, x
+
+
+def stepped(form: StandardForm, x: Array, h: float, w0: Array, w1: Array, w2: Array) -> Array:
+    """x (n, K) a Runge–Kutta step h later, for inputs (m, K) at its begin, middle and end."""
+    k1 = form.rate(x, w0)
+    k2 = form.rate(x + 0.5 * h * k1, w1)
+    k3 = form.rate(x + 0.5 * h * k2, w1)
+    k4 = form.rate(x + h * k3, w2)
+    return np.asarray(x + h / 6.0 * (k1 + 2.0 * (k2 + k3) + k4))
+
+
+def slowest(form: StandardForm) -> float:
+    """1/α [s], the time constant of the linear part's slowest mode."""
+    return 1.0 / -float(np.linalg.eigvals(form.A).real.max())
 
 
 def _steps(signal: Signal, stop: float, step: float) -> Iterator[tuple[Piece, Array]]:
@@ -94,7 +103,7 @@ def reference_floor(form: StandardForm, signal: Signal, norms: Sequence[Norm], x
 def long_enough(form: StandardForm, signal: Signal) -> float:
     """A time [s] by which the motion from x0 has been furthest off, or as good as; w may end or go on for ever."""
     times = LAST if not signal.pieces[-1].amplitudes.any() else LAST_OF_ENDLESS
-    return signal.edges[-1] + times / -float(np.linalg.eigvals(form.A).real.max())
+    return signal.edges[-1] + times * slowest(form)
 
 
 def worst(

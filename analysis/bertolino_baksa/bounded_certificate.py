@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -23,10 +23,9 @@ from .certificate import (
     system_of,
 )
 from .norms import Norm, proved_metric
+from .search import CLOSE, largest
 
 KIND = "bounded inputs"
-CLOSE = 1.01  # ratio at which a bisection stops
-LEAST = 1e-6  # of the first number: where a search ends
 SHARES = (0.1, 0.25, 0.5, 0.75, 1.0)  # of the largest δ, in the table of δ(ε)
 THEOREM = (
     "Let w be any inputs of x' = F(x, w(t)) with |w_i(t)| <= bounds_i for all t >= 0; where `tied`, the second half of "
@@ -46,19 +45,6 @@ class BoundedCertificate:
     bounds: Bounds
     S: Array
     claims: tuple[Claim, ...]
-
-
-def largest(proved: Callable[[float], object], first: float) -> float:
-    """Largest number, to CLOSE, for which proved(number) raises no NotProvedError; from `first` on up or down."""
-    good, bad, middle = 0.0, np.inf, first
-    while bad > CLOSE * good and middle > LEAST * first:
-        try:
-            proved(middle)
-            good = middle
-        except NotProvedError:
-            bad = middle
-        middle = 2.0 * good if bad == np.inf else (float(np.sqrt(good * bad)) if good else bad / 2.0)
-    return good
 
 
 def smallest(driven: Driven, norm: Norm) -> tuple[float, float]:

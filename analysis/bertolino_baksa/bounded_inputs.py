@@ -19,6 +19,7 @@ from scipy.optimize import linprog
 from scipy.sparse import diags, vstack
 
 from ..methods.standard_form import StandardForm
+from .adversary import slowest, stepped
 from .balls import Array, ExactSystem, NotProvedError, matrix, rounded
 from .cells import CELLS, Decay, decay
 from .majorant import Majorant, majorant
@@ -151,8 +152,7 @@ def worst_inputs(form: StandardForm, norm: Norm, bounds: Bounds) -> Array:
     The best for c x(T) is found for directions c in which N grows, over and over: of independent inputs, which are held
     over a step, by the signs of their kernel, and of heights that run straight from time to time by linear programming.
     """
-    stop = MEMORY / -float(np.linalg.eigvals(form.A).real.max())
-    step = stop / SAMPLES
+    step = MEMORY * slowest(form) / SAMPLES
     over, kernel = expm(form.A * step), np.empty((SAMPLES, *form.B.shape))
     kernel[-1] = expm(form.A * step / 2.0) @ form.B * step
     for k in range(SAMPLES - 1, 0, -1):
@@ -192,16 +192,10 @@ def _ramps(weights: Array, W: Array, step: float) -> Array:
 
 def reached(form: StandardForm, norm: Norm, bounds: Bounds, inputs: Array) -> float:
     """sup N(x) of the motion from rest under inputs that `worst_inputs` made."""
-    step = MEMORY / -float(np.linalg.eigvals(form.A).real.max()) / SAMPLES
-    x, most, heights = np.zeros(len(form.A)), 0.0, np.arange(inputs.shape[1]) < inputs.shape[1] // 2
+    step = MEMORY * slowest(form) / SAMPLES
+    x, most, heights = np.zeros((len(form.A), 1)), 0.0, np.arange(inputs.shape[1]) < inputs.shape[1] // 2
     for before, after in pairwise(inputs):
         last = np.where(heights & bounds.tied, after, before)
-        w0, w1, w2 = (v[:, None] for v in (before, (before + last) / 2.0, last))
-        y = x[:, None]
-        k1 = form.rate(y, w0)
-        k2 = form.rate(y + 0.5 * step * k1, w1)
-        k3 = form.rate(y + 0.5 * step * k2, w1)
-        k4 = form.rate(y + step * k3, w2)
-        x = x + step / 6.0 * (k1 + 2.0 * (k2 + k3) + k4)[:, 0]
-        most = max(most, float(norm(x)))
+        x = stepped(form, x, step, *(v[:, None] for v in (before, (before + last) / 2.0, last)))
+        most = max(most, float(norm(x)[0]))
     return most

@@ -57,8 +57,8 @@ class Proof:
     def epsilon(self, norm: Norm, delta: Array) -> Array:
         """ε (K,) for δ (K,) ≥ 0: N(x(0) − ψ(0)) ≤ δ implies N(x(t) − ψ(t)) ≤ ε for all t ≥ 0; inf if not proved.
 
-                ε(0) bounds the floor l. Raises NotProvedError for a norm that floats cannot compute, and where the
-        equations have no bound for the largest δ.
+        ε(0) bounds the floor l. Raises NotProvedError for a norm that floats cannot compute, and where the equations
+        have no bound for the largest δ.
         """
         top, later = self._rest(norm, delta)
         on_pieces = largest(self.tube, self.metric, self.decay, norm, delta, top)

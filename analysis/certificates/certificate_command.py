@@ -19,6 +19,7 @@ from ..bertolino_baksa.bounded_certificate import verify as verify_bounded
 from ..bertolino_baksa.cells import errors_of_states, outputs
 from ..bertolino_baksa.certificate import Certificate, certificate_of, opened, to_json, verify
 from ..bertolino_baksa.proof import Proof
+from ..bertolino_baksa.search import largest
 from ..bertolino_baksa.tube import Tube
 from ..car import car_form, road_signal
 from ..energy import tyre_heights
@@ -35,10 +36,9 @@ from .directed import at_least, at_most
 from .exact_car import exact_car
 
 CLOSE = 1.02  # ratio at which the bisection for the largest amplitude stops
-TINY = 1e-6  # m; below it the search for an amplitude is given up
 
 
-def make_certificate(parameters: Parameters, where: Path | None, *, largest: bool = False) -> int:
+def make_certificate(parameters: Parameters, where: Path | None, *, search: bool = False) -> int:
     """Certify x_lin from rest, print what is proved, write the file; 0, or 1 if there is no certificate.
 
     It is of the car without control: a controller of these parameters is left out, and that is said.
@@ -54,7 +54,7 @@ def make_certificate(parameters: Parameters, where: Path | None, *, largest: boo
         return 1
     for line in lines:
         print(line)
-    if largest:
+    if search:
         A = at_least(largest_amplitude(parameters))
         print(f"  the largest A with a proved tube: {A} m (by bisection, to {CLOSE:g})")
     if where is not None:
@@ -162,14 +162,6 @@ def _loads(parameters: Parameters, proof: Proof, tube: Tube) -> Array:
 
 
 def largest_amplitude(parameters: Parameters) -> float:
-    """Largest height A [m] of the road for which a tube is proved, by bisection; 0.0 if none is found."""
-    good, bad = 0.0, np.inf
-    middle = float(parameters.get("A", PARAMETERS["A"].start))
-    while not bad <= good * CLOSE and (middle > TINY or good):
-        try:
-            prove_reference({**parameters, "A": middle})
-            good = middle
-        except NotProvedError:
-            bad = middle
-        middle = 2.0 * good if bad == np.inf else float(np.sqrt(max(good, bad / 4.0) * bad))
-    return good
+    """Largest height A [m] of the road for which a tube is proved; 0.0 if none is found."""
+    first = float(parameters.get("A", PARAMETERS["A"].start))
+    return largest(lambda A: prove_reference({**parameters, "A": A}), first, CLOSE)

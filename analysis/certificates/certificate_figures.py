@@ -10,7 +10,7 @@ import numpy as np
 
 from fmu_src.quantities import POSITIONS, STATES, Quantity
 
-from ..bertolino_baksa.adversary import reached, reference_floor
+from ..bertolino_baksa.adversary import long_enough, reached, reference_floor, slowest
 from ..bertolino_baksa.certificate import Certificate, Claim
 from ..bertolino_baksa.funnel import ends, funnel
 from ..bertolino_baksa.proof import Proof
@@ -51,12 +51,12 @@ def adversary_points(certificate: Certificate) -> list[Points]:
     parameters, gain = certificate.model["parameters"], certificate.model.get("gain")
     form = car_form(car_of(parameters), gain=None if gain is None else np.array(gain))
     signal, end = road_signal(road_parameters(parameters)), float(certificate.pieces[-1].end)
-    slowest = 1.0 / -float(np.linalg.eigvals(form.A).real.max())
-    stop = min(end, signal.edges[-1] + slowest)
     norms = [claim.norm for claim in certificate.claims]
-    floors = reference_floor(form, signal, norms, certificate.x0, end)
+    floors = reference_floor(form, signal, norms, certificate.x0, min(end, long_enough(form, signal)))
     chosen = [_spread(claim) for claim in certificate.claims]
-    found = reached(form, signal, norms, certificate.x0, [rows[:, 1] for rows in chosen], stop)
+    found = reached(
+        form, signal, norms, certificate.x0, [rows[:, 1] for rows in chosen], min(end, signal.edges[-1] + slowest(form))
+    )
     return [
         Points(claim, rows, np.maximum(far, floor), floor)
         for claim, rows, far, floor in zip(certificate.claims, chosen, found, floors.tolist(), strict=True)

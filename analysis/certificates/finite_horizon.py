@@ -14,8 +14,8 @@ from fmu_src.controller.gain_table import GainTable
 from fmu_src.controller.law import control_parameters
 
 from ..bertolino_baksa.balls import Balls, ExactSystem, NotProvedError, column, decimal, jacobian, precision
-from ..bertolino_baksa.bounded_certificate import largest
 from ..bertolino_baksa.norms import Norm
+from ..bertolino_baksa.search import largest
 from ..bertolino_baksa.switched import Measured, measured, phases
 from ..bertolino_baksa.taylor import find_pieces
 from ..bertolino_baksa.tube import Excess

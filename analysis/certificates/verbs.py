@@ -64,7 +64,7 @@ def _certify(options: argparse.Namespace) -> int:
         return quick_answer(scenario.parameters)
     from .certificate_command import make_certificate
 
-    return make_certificate(scenario.parameters, options.out, largest=options.largest)
+    return make_certificate(scenario.parameters, options.out, search=options.largest)
 
 
 def _certify_run(folder: Path, options: argparse.Namespace) -> int:
