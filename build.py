@@ -27,6 +27,7 @@ DIST = ROOT / "dist"
 PACKAGE = ROOT / "fmu_src"
 SYSTEM = PACKAGE / "system"
 LEFT_OUT = ("__pycache__", "export", "system")  # of the package, in an FMU: not needed while it steps
+CURE = PACKAGE / "export" / "library.py"  # what is done to PythonFMU's library
 
 # FMU (also the name of its class) -> the module that holds the class
 MODELS = {
@@ -144,14 +145,16 @@ def build_fmu(model: str, package: Path, target: Path) -> None:
     """Export one model of the package with pythonfmu; the same sources give the same bytes.
 
     The package goes into the resources under a name that carries the hash of its content, with a slave script whose
-    name carries it too: a host process can then hold two versions. Documentation and reference results (of a run of
-    the FMU just made) are added at the end and have no part in the hash.
+    name carries it too: a host process can then hold two versions. The hash also covers how PythonFMU's library is
+    changed. Documentation and reference results (of a run of the FMU just made) are added at the end and have no part
+    in it.
     """
     from pythonfmu import FmuBuilder
 
     from fmu_src.export.contents import extra_entries
+    from fmu_src.export.library import cured
 
-    identity = hashlib.sha256(f"{model} {ENTRY} {_content_hash([package], LEFT_OUT)}".encode()).hexdigest()[:32]
+    identity = hashlib.sha256(f"{model} {ENTRY} {_content_hash([package, CURE], LEFT_OUT)}".encode()).hexdigest()[:32]
     name = f"fmu_src_{identity[:12]}"
     with tempfile.TemporaryDirectory(prefix="build_fmu_") as temporary:
         folder = Path(temporary)
@@ -167,6 +170,8 @@ def build_fmu(model: str, package: Path, target: Path) -> None:
             sys.path.remove(str(folder))  # left there by the builder
         with zipfile.ZipFile(made) as archive:
             contents = {entry: archive.read(entry) for entry in archive.namelist()}
+        contents |= {entry: cured(data) for entry, data in contents.items() if entry.startswith("binaries/linux64/")}
+        write_archive(made, contents)
         contents |= extra_entries(made)
     write_archive(target, contents)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 import sys
 import sysconfig
 import venv
@@ -58,6 +59,22 @@ def foreign(tmp_path: Path) -> Callable[..., Any]:
     from foreign_runs import runner
 
     return runner(tmp_path)
+
+
+@pytest.fixture
+def compiled(tmp_path: Path) -> Callable[..., Path]:
+    """Compiles a C source of tests/foreign; returns the program, or the library that the options make of it."""
+    from foreign_runs import FOREIGN, call
+
+    def compile(source: str, *options: object) -> Path:
+        if not sys.platform.startswith("linux") or not (compiler := shutil.which("cc")):
+            pytest.skip("no C compiler on this machine (or no Linux): C hosts are not tested here")
+        program = tmp_path / Path(source).stem
+        strict = ("-std=c11", "-O2", "-Wall", "-Wextra", "-Werror")
+        call(compiler, *strict, "-o", program, FOREIGN / source, *options, cwd=tmp_path)
+        return program
+
+    return compile
 
 
 @pytest.fixture(scope="session")

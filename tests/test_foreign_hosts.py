@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import shutil
 import subprocess
-import sys
 import sysconfig
 from collections.abc import Callable
 from pathlib import Path
@@ -12,22 +10,9 @@ from pathlib import Path
 import fmpy
 import numpy as np
 import pytest
-from foreign_runs import COUNT, FOREIGN, SAME, STATE_NAMES, STEP, call, ecos, ours
+from foreign_runs import COUNT, SAME, STATE_NAMES, STEP, call, ecos, ours
 from foreign_systems import write_plan
 from small_master import deviation, read_recording
-
-
-@pytest.fixture
-def compiled(tmp_path: Path) -> Callable[..., Path]:
-    def compile(source: str, *options: object) -> Path:
-        if not sys.platform.startswith("linux") or not (compiler := shutil.which("cc")):
-            pytest.skip("no C compiler on this machine (or no Linux): C hosts are not tested here")
-        program = tmp_path / Path(source).stem
-        strict = ("-std=c11", "-O2", "-Wall", "-Wextra", "-Werror")
-        call(compiler, *strict, "-o", program, FOREIGN / source, *options, cwd=tmp_path)
-        return program
-
-    return compile
 
 
 @pytest.mark.parametrize("linked", [False, True], ids=["preloaded", "linked"])

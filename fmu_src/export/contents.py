@@ -21,12 +21,14 @@ DRAWINGS: dict[str, Callable[[Any], None]] = {
 }
 NUMERIC = ("control", "numpy", "scipy")  # what a design for other than default parameters imports
 LICENSE = Path(__file__).parents[2] / "LICENSE"
-CPPFMU = """
+NOTICE = """
 
 ----------------------------------------------------------------------------------------------------
-The libraries in binaries/ are PythonFMU's. They hold CPPFMU, Copyright 2016-2019, SINTEF Ocean, under the
-Mozilla Public License, v. 2.0 (mozilla.org/MPL/2.0); its source is part of PythonFMU's:
-github.com/NTNU-IHB/PythonFMU, pythonfmu/pythonfmu-export.
+The libraries in binaries/ are PythonFMU's. Changed is one byte of that of version 0.7.0 for Linux, at 0x16f34: the
+function `onLibraryUnload` returns at once, since at the exit of a process it released what was released already.
+They hold CPPFMU, Copyright 2016-2019, SINTEF Ocean, under the Mozilla Public License, v. 2.0 (mozilla.org/MPL/2.0);
+its source, in which nothing is changed, is part of PythonFMU's: github.com/NTNU-IHB/PythonFMU,
+pythonfmu/pythonfmu-export.
 """
 
 
@@ -72,7 +74,7 @@ def _license_of_pythonfmu() -> bytes:
     text = next((found for name in ("licenses/LICENSE", "LICENSE") if (found := installed.read_text(name))), None)
     if text is None:
         raise LookupError("no licence is installed with pythonfmu, whose code goes into the FMU")
-    return (text.rstrip() + CPPFMU).encode()
+    return (text.rstrip() + NOTICE).encode()
 
 
 # ------------------------------------------------------------------ pages

@@ -186,6 +186,5 @@ int main(int count, char **arguments) {
     }
     python_says(getenv("PYTHON_SAYS"));
     finish(&plan);
-    /* not by exit: PythonFMU's library can abort a process in its exit handlers (README, Limits) */
-    _Exit(fclose(result) ? 1 : 0);
+    return fclose(result) ? 1 : 0;
 }
