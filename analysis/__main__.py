@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import argparse
-import os
 import signal
 import sys
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
-from typing import NoReturn
 
 from fmu_src.quantities import ParameterError
 
@@ -277,19 +275,5 @@ def _stabilize(options: argparse.Namespace) -> int:
     return run(options.out)
 
 
-def _leave(status: int) -> NoReturn:
-    """End the process without the exit handlers of C libraries.
-
-    PythonFMU's library frees its interpreter state in one of them and uses it again in a later one, which now and then
-    aborts a process that has done its work.
-    """
-    sys.stdout.flush()
-    sys.stderr.flush()
-    os._exit(status)
-
-
 if __name__ == "__main__":
-    try:
-        _leave(main())
-    except SystemExit as leaving:  # of --help, of a wrong option, of SIGTERM
-        _leave(leaving.code if isinstance(leaving.code, int) else 0)
+    sys.exit(main())

@@ -80,7 +80,7 @@ def test_fmpys_own_command_line_simulates_it(
 ) -> None:
     out = tmp_path / "out.csv"
     command = [bare_environment / "fmpy", "simulate", dist / f"{model}.fmu", "--output-file", out]
-    call(*command, cwd=tmp_path, fragile=True)
+    call(*command, cwd=tmp_path)
     with out.open(newline="") as file:
         rows = list(csv.DictReader(file))
     assert float(rows[-1]["time"]) == pytest.approx(5.0)
@@ -92,13 +92,12 @@ def test_fmpys_own_command_line_simulates_it(
 def test_a_perturbed_start_can_be_driven_from_fmpy_alone(dist: Path, bare_environment: Path, tmp_path: Path) -> None:
     """A foreign host in an isolated Python: start value in, decaying motion out, and the code is the FMU's own copy."""
     code = (
-        "import os, sys, fmpy\n"
+        "import sys, fmpy\n"
         "r = fmpy.simulate_fmu(sys.argv[1], stop_time=4.0, start_values={'body.heave': 0.02}, output=['body.heave'])\n"
         "names = [n for n in sys.modules if n.startswith('fmu_src')]\n"
         "assert names and all(n.startswith('fmu_src_') for n in names), names\n"
         "assert not any(m in sys.modules for m in ('scipy', 'control', 'matplotlib'))\n"
-        "print(r['body.heave'][0], abs(r['body.heave'][-1]), flush=True)\n"
-        "os._exit(0)\n"  # PythonFMU's library can abort a process in its exit handlers (README, Limits)
+        "print(r['body.heave'][0], abs(r['body.heave'][-1]))\n"
     )
     command = [str(bare_environment / "python"), "-I", "-c", code, str(dist / "Vehicle7DOF.fmu")]
     done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=120)
@@ -118,7 +117,6 @@ def test_many_instances_in_one_process_live_and_die(dist: Path) -> None:
         "short = replace(read_scenario('bump'), stop_time=0.005)\n"
         "runs = [simulate(short).trajectory.values.tobytes() for _ in range(40)]\n"
         "assert len(set(runs)) == 1\n"
-        "import os; os._exit(0)\n"  # as above
     )
     done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, timeout=300)
     assert done.returncode == 0, done.stdout + done.stderr

@@ -12,7 +12,6 @@ import build
 from fmu_src.vehicle.vehicle7dof import Vehicle7DOF
 
 HOST = """
-import os
 import sys
 from pathlib import Path
 from fmpy import extract, read_model_description
@@ -40,8 +39,6 @@ assert not [name for name in sys.modules if name == "fmu_src"]
 for fmu, _ in pair:
     fmu.terminate()
     fmu.freeInstance()
-sys.stdout.flush()
-os._exit(0)  # PythonFMU's library can abort a process in its exit handlers (README, Limits)
 """
 
 

@@ -27,8 +27,6 @@ WORDS = {
 }
 FEED_THROUGH = {"Vehicle7DOF": "accelerations and tyre forces", "LqrController": "all forces"}
 PUSHES = dict(zip(CORNERS, (200.0, -100.0, 150.0, -50.0), strict=True))  # N; moves heave, roll and pitch
-# fmpy's command line, left without the exit handlers in which PythonFMU's library can abort (README, Limits)
-FMPY = "import os; from fmpy.cli import main; main(); os._exit(0)"
 NAMESPACE = "http://fmi-standard.org/fmi-ls-manifest"
 Stimuli = Callable[[int], dict[str, float]]
 """Inputs by name at the communication point of this number; what is not named is 0."""
@@ -89,7 +87,7 @@ def results(fmu: Path, fed: bytes | None) -> bytes:
     """CSV of all outputs of the FMU at all communication points. Raises CalledProcessError with what FMPy said."""
     with tempfile.TemporaryDirectory(prefix="reference_") as temporary:
         folder = Path(temporary)
-        command = [sys.executable, "-I", "-c", FMPY, "simulate", str(fmu.resolve())]
+        command = [sys.executable, "-I", "-m", "fmpy", "simulate", str(fmu.resolve())]
         command += ["--output-file", str(folder / "out.csv")]
         command += ["--stop-time", repr(STOP), "--output-interval", repr(STEP)]
         if fed is not None:

@@ -110,6 +110,5 @@ int main(int count, char **arguments) {
     }
     cosim_execution_destroy(execution);
     cosim_observer_destroy(observer);
-    /* not by exit: PythonFMU's library can abort a process in its exit handlers (README, Limits) */
-    _Exit(fclose(result) ? 1 : 0);
+    return fclose(result) ? 1 : 0;
 }

@@ -6,7 +6,6 @@ join controller and car: the four forces with the body's heave rate, whose produ
 
 from __future__ import annotations
 
-import os
 import sys
 import tempfile
 import xml.etree.ElementTree as ET
@@ -91,4 +90,3 @@ def main(archive: str, stop: float, result: Path, step: float, least: float, mos
 
 
 main(sys.argv[1], float(sys.argv[2]), Path(sys.argv[3]), *map(float, sys.argv[4:8]))
-os._exit(0)  # PythonFMU's library can abort a process in its exit handlers (README, Limits)

@@ -6,7 +6,6 @@ ecospy's library needs libtbb.so.12; the wheel `tbb` puts it into the environmen
 from __future__ import annotations
 
 import ctypes
-import os
 import sys
 import xml.etree.ElementTree as ET
 import zipfile
@@ -44,4 +43,3 @@ def main(system: str, count: int, result: Path, parameter_set: str | None) -> No
 
 
 main(sys.argv[1], int(sys.argv[2]), Path(sys.argv[3]), sys.argv[4] if len(sys.argv) > 4 else None)
-os._exit(0)  # PythonFMU's library can abort a process in its exit handlers (README, Limits)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import sys
 from pathlib import Path
 
@@ -21,4 +20,3 @@ def main(system: str, stop: float, step: float, result: Path, parameter_set: str
 
 
 main(sys.argv[1], float(sys.argv[2]), float(sys.argv[3]), Path(sys.argv[4]), sys.argv[5] if len(sys.argv) > 5 else None)
-os._exit(0)  # PythonFMU's library can abort a process in its exit handlers (README, Limits)
