@@ -1,7 +1,7 @@
 """How far motions really get on inputs of a class through given rows: no proof, a number beside every proved one.
 
 The inputs leave the chords between rows as far as the class lets them: not at all, to sides by chance, and for each
-mode of the linear part to the sides that drive it in resonance.
+mode of the linear part to the sides that drive it in resonance, at PHASES.
 """
 
 from __future__ import annotations
@@ -16,6 +16,8 @@ from .adversary import STEP, stepped
 from .balls import Array
 from .input_rows import InputRows, RowClass
 from .norms import Norm
+
+PHASES = np.arange(8) * np.pi / 4.0
 
 
 def reached(form: StandardForm, norms: Sequence[Norm], rows: InputRows, x0: Array) -> Array:
@@ -38,7 +40,7 @@ def _signs(form: StandardForm, rows: InputRows) -> Array:
     found = [np.zeros((steps, k)), chance]
     for rate, row in zip(linear.eigenvalues, linear.K_inverse @ form.B[:, :k], strict=True):
         if rate.imag > 0.0:
-            found.append(np.sign(np.real(np.exp(-1j * rate.imag * middle)[:, None] * row)))
+            found += [np.sign(np.real(np.exp(1j * (phase - rate.imag * middle))[:, None] * row)) for phase in PHASES]
     return np.stack(found, axis=2)
 
 
