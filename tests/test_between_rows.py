@@ -14,12 +14,13 @@ from orders import observed_order
 
 from analysis.bertolino_baksa.balls import jacobian, precision
 from analysis.bertolino_baksa.hermite import quintics
+from analysis.bertolino_baksa.input_rows import RowClass
 from analysis.bertolino_baksa.sampled import Samples
 from analysis.bertolino_baksa.tube import input_matrix
 from analysis.car import car_form, road_signal
 from analysis.certificates.exact_car import energy_norm, exact_system
 from analysis.certificates.run_certificates import _everywhere, _motions, certified_findings
-from analysis.certificates.unknown_roads import TILTED, AllRoads, RoadClass, road_class, samples
+from analysis.certificates.unknown_roads import TILTED, AllRoads, road_class, samples
 from analysis.errors import InputError
 from analysis.reference import road_parameters
 from analysis.scenario import read_scenario
@@ -45,7 +46,7 @@ def everywhere(run: Run, x: Array, t: Array, heights: Array, form: str, own: flo
 
 
 # ---------------------------------------------------------------------------------------------- every road of a class
-def bow(roads: RoadClass, step: float, s: Array, slope: Array) -> tuple[Array, Array]:
+def bow(roads: RowClass, step: float, s: Array, slope: Array) -> tuple[Array, Array]:
     """Largest height that the class leaves beside the chord for all s in a cell, nearly, and its rate."""
     if roads.kind == "curv":
         return roads.bound * s * (step - s) / 2.0 + 0.0 * slope, roads.bound * (step / 2.0 - s) + 0.0 * slope
@@ -61,7 +62,7 @@ def adversaries(cells: int, step: float) -> Array:
     return np.stack([chance, np.outer([1, -1, 1, -1], roll), np.tile(heave, (4, 1))], axis=2)
 
 
-def motions_on(car: Car, roads: RoadClass, heights: Array, step: float) -> tuple[Array, Array]:
+def motions_on(car: Car, roads: RowClass, heights: Array, step: float) -> tuple[Array, Array]:
     """x and x_lin (points, 14, 3) from rest on the fine grid, on roads of the class through the heights (N, 4)."""
     form, signs, slopes = car_form(car, order=1), adversaries(len(heights) - 1, step), np.diff(heights, axis=0) / step
     x = lin = np.zeros((14, 3))
@@ -153,7 +154,7 @@ def test_what_a_class_leaves_open_is_what_its_steepest_roads_reach() -> None:
     """Class `lip` between heights of slope g: straight up at H1, then down; the mean over half a cell of what
     they have reached from the nearer row on, by quadrature."""
     step, slope, bound = 1e-3, 0.3, 0.7
-    peak, mean, _ = RoadClass("lip", bound).between(np.array([step]), np.array([[slope]]), np.zeros((1, 1)))
+    peak, mean, _ = RowClass("lip", bound).between(np.array([step]), np.array([[slope]]), np.zeros((1, 1)))
     s = np.linspace(0.0, step, 100_001)
     up = np.minimum(bound * s, slope * step + bound * (step - s)) - slope * s
     most = np.maximum(up, up[::-1])  # the road that falls first is this one backwards

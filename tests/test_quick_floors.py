@@ -15,8 +15,9 @@ from analysis.__main__ import main
 from analysis.bertolino_baksa import quick
 from analysis.bertolino_baksa.adversary import reference_floor
 from analysis.bertolino_baksa.balls import precision
+from analysis.bertolino_baksa.convolution import largest_over
 from analysis.bertolino_baksa.norms import proved_metric
-from analysis.bertolino_baksa.quick import _over, quick_floors
+from analysis.bertolino_baksa.quick import quick_floors
 from analysis.bertolino_baksa.taylor import find_pieces
 from analysis.bertolino_baksa.tube import prove_linear
 from analysis.car import car_form, road_signal
@@ -65,7 +66,7 @@ def test_r_along_x_lin_is_bounded_over_every_cell() -> None:
         off = prove_linear(system, metric, pieces)
         X = np.hstack([quick.ranges(pieces, off, metric), quick.inputs(system, metric, pieces)])
         bound = quick.majorant(system, 2.0 * X.max(axis=0) + 1e-9)
-        found = quick._along(system, metric, pieces, off, X, bound)
+        found = quick._along(system, metric, pieces, off, bound)
     ends, largest = np.concatenate([[0.0], np.cumsum(quick.widths(pieces, metric))]), np.zeros(14)
     for cell in range(0, 300, 7):
         times = np.linspace(ends[cell], ends[cell + 1], 100)[1:-1]
@@ -82,7 +83,7 @@ def test_r_along_x_lin_is_bounded_over_every_cell() -> None:
 def test_the_largest_over_spans_of_cells() -> None:
     ends = np.array([0.0, 1.0, 1.5, 4.0])
     values = np.array([[1.0], [3.0], [2.0]])
-    found = _over(ends, values, np.array([-1.0, 0.2, 1.2, 1.6]), np.array([0.5, 1.2, 1.4, 9.0]))
+    found = largest_over(ends, values, np.array([-1.0, 0.2, 1.2, 1.6]), np.array([0.5, 1.2, 1.4, 9.0]))
     assert found[:, 0].tolist() == [1.0, 3.0, 3.0, 2.0]
 
 

@@ -5,7 +5,7 @@ All motions are integrated at once (Runge–Kutta of order 4 on the full equatio
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 from scipy.linalg import expm
@@ -39,16 +39,16 @@ def motions(
     for piece, times in _steps(signal, stop, step):
         for t, later in zip(times[:-1].tolist(), times[1:].tolist(), strict=True):
             h = later - t
-            x = stepped(form, x, h, *(piece(s)[:, None] * ones for s in (t, t + 0.5 * h, later)))
+            x = stepped(form.rate, x, h, *(piece(s)[:, None] * ones for s in (t, t + 0.5 * h, later)))
             yield later, x
 
 
-def stepped(form: StandardForm, x: Array, h: float, w0: Array, w1: Array, w2: Array) -> Array:
-    """x (n, K) a Runge–Kutta step h later, for inputs (m, K) at its begin, middle and end."""
-    k1 = form.rate(x, w0)
-    k2 = form.rate(x + 0.5 * h * k1, w1)
-    k3 = form.rate(x + 0.5 * h * k2, w1)
-    k4 = form.rate(x + h * k3, w2)
+def stepped(rate: Callable[[Array, Array], Array], x: Array, h: float, w0: Array, w1: Array, w2: Array) -> Array:
+    """x (n, K) of x' = rate(x, w) a Runge–Kutta step h later, for inputs (m, K) at its begin, middle and end."""
+    k1 = rate(x, w0)
+    k2 = rate(x + 0.5 * h * k1, w1)
+    k3 = rate(x + 0.5 * h * k2, w1)
+    k4 = rate(x + h * k3, w2)
     return np.asarray(x + h / 6.0 * (k1 + 2.0 * (k2 + k3) + k4))
 
 

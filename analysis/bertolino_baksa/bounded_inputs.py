@@ -196,6 +196,6 @@ def reached(form: StandardForm, norm: Norm, bounds: Bounds, inputs: Array) -> fl
     x, most, heights = np.zeros((len(form.A), 1)), 0.0, np.arange(inputs.shape[1]) < inputs.shape[1] // 2
     for before, after in pairwise(inputs):
         last = np.where(heights & bounds.tied, after, before)
-        x = stepped(form, x, step, *(v[:, None] for v in (before, (before + last) / 2.0, last)))
+        x = stepped(form.rate, x, step, *(v[:, None] for v in (before, (before + last) / 2.0, last)))
         most = max(most, float(norm(x)[0]))
     return most

@@ -18,6 +18,7 @@ from .tube import Outputs, Piece, Tube, enclosed_series
 
 CELLS, LATE_CELLS = 12, 3  # per piece, for e^(At) and the growth of perturbations: at first, and from
 LATE = 2.0  # times the slowest time constant on, when what oscillates fast has died out
+PARTS = 4  # of a cell, in whose middles R itself is known
 FINE = 288  # per piece, for the norm of e
 EPS = 1e-13  # relative: covers the roundings of a polynomial's or a product's value, over the sum of its terms' sizes
 
@@ -71,17 +72,22 @@ class Decay:
 
         near : values (N + 1, p, q) of u at the cells' ends, linear between them and 0 from the last on; none: u = 0.
 
-        On a cell by the trapezium of its ends, as |chord| is convex; what comes after the last cell by ‖·‖_S.
+        What comes after the last cell is bounded by ‖·‖_S.
         """
         centre, rest = rounded(right)
-        values = left @ self.ends @ centre
-        sizes, bend = np.abs(values if near is None else values - near), np.abs(left) @ self.curve @ np.abs(centre)
-        whole = (((sizes[:-1] + sizes[1:]) / 2 + bend) * self.width[:, None, None]).sum(axis=0)
-        off = self._rounding(left, centre, rest) * self.width.sum()
+        whole = self.by_cells(left, right, near).sum(axis=0)
         start = np.sqrt(((metric.S @ self.ends[-1] @ centre) ** 2).sum(axis=0)) * (1 + EPS)
         start += self._rounding(metric.S, centre, rest)
         reach = np.sqrt((magnitudes(matrix(left) * metric.inverse) ** 2).sum(axis=1))
-        return np.asarray((whole + off + np.outer(reach, start) / metric.alpha) * (1 + 10 * EPS))
+        return np.asarray((whole + np.outer(reach, start) / metric.alpha) * (1 + 10 * EPS))
+
+    def by_cells(self, left: Array, right: arb_mat, near: Array | None = None) -> Array:
+        """The same (N, p, q) over each cell alone, by the trapezium of its ends, as |chord| is convex."""
+        centre, rest = rounded(right)
+        values = left @ self.ends @ centre
+        sizes, bend = np.abs(values if near is None else values - near), np.abs(left) @ self.curve @ np.abs(centre)
+        heights = (sizes[:-1] + sizes[1:]) / 2 + bend + self._rounding(left, centre, rest)
+        return np.asarray(heights * self.width[:, None, None])
 
     def _rounding(self, left: Array, inverse: Array, rest: float) -> float:
         """What rounding and enclosures add, at most, to any norm of left · e^(At) · inverse, with much to spare."""
@@ -150,6 +156,32 @@ def inputs(system: ExactSystem, metric: Metric, pieces: Sequence[Piece]) -> Arra
         over = system.inputs_over(p.begin, p.end)
         found += [[above(w) for w in over(t)] for t in steps]
     return np.array(found)
+
+
+def middles(
+    system: ExactSystem, metric: Metric, polynomials: Sequence[Array], pieces: Sequence[Piece], off: Array
+) -> tuple[Array, Array]:
+    """(x, w) (n + m, N PART) in the middles of PARTS of each of the cells of `decay`, and how far they may be off these
+    over the parts; x within `off` (pieces,) [‖·‖_S] of the pieces' polynomials (n, …) in τ."""
+    middle, radius = [], []
+    for piece, p, count, V in zip(pieces, polynomials, counts(pieces, metric), off, strict=True):
+        parts = count * PARTS
+        values, bend = sampled(p, parts)
+        over = system.inputs_over(piece.begin, piece.end)
+        times = (arb(piece.begin) + arb(piece.duration) * (arb(k) + arb(0.5, 0.5)) / parts for k in range(parts))
+        resting = all(w == 0 for w in over(arb(piece.begin) + arb(piece.duration) * arb(0.5, 0.5)))
+        w = [[arb(0)] * system.m] * parts if resting else [over(t) for t in times]
+        near = np.array([[float(v.mid()) for v in each] for each in w])
+        apart = [[above(v - arb(c)) for v, c in zip(*both, strict=True)] for both in zip(w, near.tolist(), strict=True)]
+        middle.append(np.vstack([(values[:, :-1] + values[:, 1:]) / 2.0, near.T]))
+        spread = np.abs(values[:, 1:] - values[:, :-1]) / 2.0 + (bend + V * metric.reach)[:, None]
+        radius.append(np.vstack([spread, np.array(apart).T]))
+    return np.concatenate(middle, axis=1), np.concatenate(radius, axis=1) * (1 + EPS)
+
+
+def largest_of_parts(values: Array) -> Array:
+    """Largest (N, k) over each cell of values (k, N PARTS) over the parts of `middles`."""
+    return np.asarray(values.reshape(len(values), -1, PARTS).max(axis=2).T)
 
 
 def errors(tube: Tube, metric: Metric, norm: Norm) -> Array:

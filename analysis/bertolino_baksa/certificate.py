@@ -94,20 +94,21 @@ def certify(
         for stop in stops:
             pieces = tuple(find_pieces(system, x0.tolist(), stop))
             proof = prove(system, proved_metric(system, S), pieces, x0.tolist())
-            x_lin = np.concatenate([values(p.linear) for p in pieces], axis=1)
+            x_lin = motion(pieces)
             floors = [(norm, float(proof.epsilon(norm, np.zeros(1))[0])) for norm in norms(x_lin)]
             if all(proof.settled(norm, floor) for norm, floor in floors):
                 break
-        claims = tuple(_claim(proof, norm, floor, float(norm(x_lin).max())) for norm, floor in floors)
+        claims = tuple(claim_of(proof, norm, floor, float(norm(x_lin).max())) for norm, floor in floors)
     return Certificate(model, x0, S, pieces, claims), proof
 
 
-def values(coefficients: Array, points: int = 9) -> Array:
-    """A piece's polynomials (n, points) at even times over the piece, its ends among them."""
-    return coefficients @ np.linspace(0.0, 1.0, points) ** np.arange(coefficients.shape[1])[:, None]
+def motion(pieces: Sequence[Piece], points: int = 9) -> Array:
+    """x_lin's polynomials (n, pieces · points) at even times over each piece, its ends among them."""
+    tau = np.linspace(0.0, 1.0, points)
+    return np.concatenate([p.linear @ tau ** np.arange(p.linear.shape[1])[:, None] for p in pieces], axis=1)
 
 
-def _claim(proof: Proof, norm: Norm, floor: float, scale: float) -> Claim:
+def claim_of(proof: Proof, norm: Norm, floor: float, scale: float) -> Claim:
     """The table with the largest δ that is found; its smallest δ raises the floor by but FIRST of it.
 
     floor : what is proved of δ = 0.
@@ -173,10 +174,7 @@ def to_json(certificate: Certificate) -> bytes:
             "x0": certificate.x0.tolist(),
             "metric": certificate.S.tolist(),
             "claims": claims_json(certificate.claims),
-            "pieces": [
-                {"begin": str(p.begin), "end": str(p.end), "x_lin": p.linear.tolist(), "e": p.error.tolist()}
-                for p in certificate.pieces
-            ],
+            "pieces": pieces_json(certificate.pieces),
         }
     )
 
@@ -195,6 +193,13 @@ def claims_json(claims: Sequence[Claim]) -> list[dict[str, Any]]:
             "delta of eps": [{"eps": e, "delta": d} for e, d in c.table.tolist()],
         }
         for c in claims
+    ]
+
+
+def pieces_json(pieces: Sequence[Piece]) -> list[dict[str, Any]]:
+    """Pieces as plain data."""
+    return [
+        {"begin": str(p.begin), "end": str(p.end), "x_lin": p.linear.tolist(), "e": p.error.tolist()} for p in pieces
     ]
 
 
@@ -230,9 +235,14 @@ def certificate_of(content: dict[str, Any]) -> Certificate:
     strict.of_keys(content, ("format", "theorem", "model", "x0", "metric", "claims", "pieces"))
     strict.theorem(content["theorem"], THEOREM)
     x0 = strict.numbers(content["x0"], 1)
-    n = len(x0)
+    S, model, claims = system_of(content, len(x0))
+    return Certificate(model, x0, S, pieces_of(content["pieces"], len(x0)), claims)
+
+
+def pieces_of(values: Any, n: int) -> tuple[Piece, ...]:
+    """Pieces of n states from plain data; raises ValueError where they cannot be."""
     pieces = []
-    for p in content["pieces"]:
+    for p in values:
         strict.of_keys(p, ("begin", "end", "x_lin", "e"))
         linear, error = strict.numbers(p["x_lin"], 2), strict.numbers(p["e"], 2)
         if not (linear.shape == error.shape and len(linear) == n and 2 <= linear.shape[1] <= 100):
@@ -241,10 +251,9 @@ def certificate_of(content: dict[str, Any]) -> Certificate:
         if not end > begin:
             raise ValueError(f"a piece runs from {begin} to {end}")
         pieces.append(Piece(begin, end, linear, error))
-    S, model, claims = system_of(content, n)
     if not pieces:
         raise ValueError("wanted pieces")
-    return Certificate(model, x0, S, tuple(pieces), claims)
+    return tuple(pieces)
 
 
 def system_of(content: dict[str, Any], n: int) -> tuple[Array, dict[str, Any], tuple[Claim, ...]]:

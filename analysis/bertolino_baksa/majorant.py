@@ -18,6 +18,8 @@ from ..methods.power_series import PowerSeries, cos, sin, variables
 from .balls import Array, ExactSystem, NotProvedError, above, coefficients, precision, refuse_unrest
 
 ORDER = 5
+ROOM = 2.5  # of the box on which the equations are bounded, over the largest motion; 1.5 to 8 hardly change δ_max
+ROOM_INPUT = 10.0  # the same for inputs, so that a quiet motion under a large input is not taken for a large one
 SECANT = 0.125  # of a box's side
 CRUMB = 1e-18  # coefficients below it are lumped together
 SLACK = 1e-12  # relative; a few hundred roundings of numbers ≥ 0 make less than 1e-13
@@ -107,8 +109,19 @@ class Majorant:
         return self.signed @ self._products(y)
 
     def _products(self, y: Array) -> Array:
-        factors = np.concatenate([y, np.ones((1, y.shape[1]))])[self.monomials]
-        return np.asarray(np.multiply.reduce(factors, axis=1))
+        return np.asarray(np.multiply.reduce(self._factors(y), axis=1))
+
+    def _factors(self, y: Array) -> Array:
+        return np.asarray(np.concatenate([y, np.ones((1, y.shape[1]))])[self.monomials])
+
+    def _derivatives(self, coefficients: Array, y: Array) -> Array:
+        """∂/∂y (n, n + m, K) of the polynomials with these coefficients (n, M) at y (n + m, K), the tail left out."""
+        factors, found = self._factors(y), np.zeros((len(coefficients), *y.shape))
+        for k in range(ORDER):
+            others = np.multiply.reduce(np.delete(factors, k, axis=1), axis=1)
+            of = self.monomials[:, k] == np.arange(len(y))[:, None]
+            found += (coefficients[:, None, :] * of) @ others
+        return found
 
     def tail(self, far: Array, Y: Array) -> Array:
         """Bound (n, K) of how the tail changes by Y (n + m, K) on the box far (n + m, K), inf out of the whole box."""
@@ -122,6 +135,19 @@ class Majorant:
         """
         far = X[:, None] + Y
         return (self(far) * (1.0 + SLACK) - at_X[:, None] * (1.0 - SLACK) + self.tail(far, Y)) * (1.0 + SLACK)
+
+    def change_near(self, middle: Array, radius: Array, Y: Array) -> Array:
+        """Bound (n, K) of |R(z + y) − R(z)| for |z − middle| ≤ radius and |y| ≤ Y (n + m, K), inf out of the box.
+
+        By R's derivatives in the middle, of which terms may cancel, and by those of R̄ for how they change.
+        """
+        sizes = np.abs(middle)
+        by_own = np.einsum("ijk,jk->ik", np.abs(self._derivatives(self.signed, middle)), Y)
+        by_sizes = np.einsum("ijk,jk->ik", self._derivatives(self.coefficients, sizes), Y)
+        far = sizes + radius + Y
+        total = self(far)
+        changed = by_own - by_sizes + total - self(sizes + radius)
+        return np.asarray((changed + 4.0 * SLACK * total) * (1.0 + SLACK) + self.tail(far, Y))
 
 
 def majorant(system: ExactSystem, box: Array) -> Majorant:
@@ -142,6 +168,11 @@ def majorant(system: ExactSystem, box: Array) -> Majorant:
     crumbs = (values[:, ~used] * np.prod(np.append(box, 1.0)[monomials[~used]], axis=1)).sum(axis=1)
     kept = monomials[used], values[:, used], signed[:, used]
     return Majorant(*kept, box, crumbs * (1.0 + SLACK), _tail_slope(system, box))
+
+
+def roomy(system: ExactSystem, X: Array) -> Majorant:
+    """The majorant on a box with room around motions and inputs within X (n + m,); raises as `majorant`."""
+    return majorant(system, np.concatenate([ROOM * X[: system.n], ROOM_INPUT * X[system.n :]]) + 1e-9)
 
 
 def _tail_slope(system: ExactSystem, box: Array) -> Array:

@@ -1,7 +1,8 @@
 """The proof of definition 2.1 for ψ = x_lin: everything that holds for all t ≥ 0, from given pieces.
 
 With x the motion from ψ(0) itself and y the difference of another one to it, N(x + y − x_lin) ≤ N(e) + N(y). The tube
-bounds e; y is e^(At) y(0), exactly, and a rest that `growth` bounds. What comes after the last piece is a tail.
+bounds e; y is e^(At) y(0), exactly, and a rest that `growth` bounds. What comes after the last piece is a tail; of an
+input that is not known exactly, `open_inputs` bounds what that changes, until the end of the pieces.
 """
 
 from __future__ import annotations
@@ -17,14 +18,12 @@ from .balls import Array, ExactSystem, NotProvedError, above, jacobian, refuse_u
 from .cells import Decay, decay, errors, inputs, ranges
 from .growth import perturbed
 from .joint import largest
-from .majorant import Majorant, majorant
+from .majorant import Majorant, roomy
 from .norms import Metric, Norm, usable_inverse
+from .open_inputs import Loose, Open, opened
 from .tube import Off, Piece, Tube, at_end, followed, jumps, prove_tube
 
 SETTLED = 1e-3
-ROOM = 2.5  # of the box on which the equations are bounded, over the largest motion; 1.5 to 8 hardly change δ_max
-ROOM_INPUT = 10.0  # the same for inputs, so that a quiet motion under a large input is not taken for a large one
-
 UNDERFLOW = 1e-80  # squares that floats round to 0 make less than 1e-154, times sizes within `norms.RANGE`
 
 
@@ -45,7 +44,10 @@ class Repetition:
 
 @dataclass(frozen=True, slots=True)
 class Proof:
-    """What is proved of the reference motion x and of x_lin; `repetition` is None where the road ends flat."""
+    """What is proved of the reference motion x and of x_lin; `repetition` is None where the road ends flat.
+
+    open : None where w is known. Else x and x_lin are those of any such w, and nothing is said of what comes later.
+    """
 
     system: ExactSystem
     metric: Metric
@@ -53,6 +55,7 @@ class Proof:
     decay: Decay
     X: Array  # bounds (N, n + m) of (x, w) over the cells
     repetition: Repetition | None
+    open: Open | None = None
 
     def epsilon(self, norm: Norm, delta: Array) -> Array:
         """ε (K,) for δ (K,) ≥ 0: N(x(0) − ψ(0)) ≤ δ implies N(x(t) − ψ(t)) ≤ ε for all t ≥ 0; inf if not proved.
@@ -62,6 +65,8 @@ class Proof:
         """
         top, later = self._rest(norm, delta)
         on_pieces = largest(self.tube, self.metric, self.decay, norm, delta, top)
+        if self.open is not None:
+            on_pieces = on_pieces + self.open.errors(norm)[:, None]
         return np.maximum(on_pieces.max(axis=0), later) * (1.0 + 1e-9) + UNDERFLOW
 
     def bounded(self, norm: Norm, delta: float) -> bool:
@@ -87,12 +92,12 @@ class Proof:
 
     def majorant(self, spread: Array) -> Majorant:
         """R̄ on a box with room for motions that are off the reference by `spread` (n,)."""
-        n = self.system.n
-        X = self.X.max(axis=0)
-        return majorant(self.system, np.concatenate([ROOM * (X[:n] + spread), ROOM_INPUT * X[n:]]) + 1e-9)
+        return roomy(self.system, self.X.max(axis=0) + np.pad(spread, (0, self.system.m)))
 
     def _later(self, norm: Norm, bound: Majorant, off: Array) -> Array:
         """sup N(e + y) after the last piece, where ‖y‖_S begins with `off` (K,)."""
+        if self.open is not None:
+            return np.zeros(len(off))
         c = self.metric.of(norm)
         if self.repetition is None:
             return np.array([c * at_rest(self.system, self.metric, *self.ends, u) for u in off.tolist()])
@@ -114,21 +119,36 @@ class Proof:
 
 def prove(system: ExactSystem, metric: Metric, pieces: Sequence[Piece], x0: Sequence[float]) -> Proof:
     """Prove what can be proved from these pieces. Raises NotProvedError if they do not suffice."""
-    refuse_unrest(system)
-    if pieces[0].begin != 0:
-        raise NotProvedError(f"the first piece begins at t = {float(pieces[0].begin):g} s; wanted 0")
     corner, last = system.pieces[-1]
     if pieces[-1].end < corner:
         raise NotProvedError("the pieces end before the road's last corner")
     if system.period == 0 and not all(w == 0 for w in last(arb(0, math.inf))):
         raise NotProvedError("the road has no period, and after its last corner it is not proved to be flat")
-    tube = prove_tube(system, metric, pieces, (np.array(x0, dtype=float), np.zeros(system.n)))
-    X = np.hstack([ranges(tube.pieces, tube.full, metric), inputs(system, metric, tube.pieces)])
+    tube, X = _reference(system, metric, pieces, x0)
     again = _repetition(system, metric, tube) if system.period != 0 else None
     proof = Proof(system, metric, tube, decay(metric, tube.pieces), X, again)
     if again is None and not rest_growth(system, metric, proof.ends[0]) < metric.alpha:
         raise NotProvedError("at the end of the last piece the motion is still too large to be proved to die out")
     return proof
+
+
+def prove_open(
+    system: ExactSystem, metric: Metric, pieces: Sequence[Piece], x0: Sequence[float], loose: Loose
+) -> Proof:
+    """The same until the end of the pieces, for all w that are but so far off the system's. Raises NotProvedError."""
+    tube, X = _reference(system, metric, pieces, x0)
+    flow = decay(metric, tube.pieces)
+    found = opened(system, metric, tube, flow, X, loose)
+    return Proof(system, metric, tube, flow, X + found.wider, None, found)
+
+
+def _reference(system: ExactSystem, metric: Metric, pieces: Sequence[Piece], x0: Sequence[float]) -> tuple[Tube, Array]:
+    """The tube, and bounds (N, n + m) of (x, w) over the cells."""
+    refuse_unrest(system)
+    if pieces[0].begin != 0:
+        raise NotProvedError(f"the first piece begins at t = {float(pieces[0].begin):g} s; wanted 0")
+    tube = prove_tube(system, metric, pieces, (np.array(x0, dtype=float), np.zeros(system.n)))
+    return tube, np.hstack([ranges(tube.pieces, tube.full, metric), inputs(system, metric, tube.pieces)])
 
 
 def _repetition(system: ExactSystem, metric: Metric, tube: Tube) -> Repetition:

@@ -11,13 +11,13 @@ What it still says too much, as nothing cancels over time, whoever prints it mea
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
-from flint import arb, fmpq
+from flint import fmpq
 
-from .balls import Array, ExactSystem, NotProvedError, above
-from .cells import Decay, counts, decay, inputs, ranges, sampled, widths
+from .balls import Array, ExactSystem, NotProvedError
+from .cells import Decay, decay, inputs, largest_of_parts, middles, ranges, widths
+from .convolution import convolution
 from .growth import perturbed
 from .majorant import Majorant, majorant
 from .norms import Metric, Norm
@@ -26,8 +26,6 @@ from .taylor import find_pieces
 from .tube import Piece, at_end, prove_linear
 
 ROOM, SHARE = 2.0, 0.1  # of the box, over x_lin's sizes, and over what a motion of its size could be in each state
-POINTS = 4  # of a cell, for R along x_lin
-WINDOWS = 500  # of equal width, for the integral
 PASSES = 2  # of the integral, each with the bounds of e that the last one gave
 SLACK = 1.0 + 1e-9
 
@@ -47,7 +45,7 @@ def quick_floors(
     if not np.isfinite(V).all():
         raise NotProvedError("the quick comparison cannot follow so large a motion")
     lefts = [np.eye(n), metric.S, *(norm.T for norm in norms)]
-    along = _along(system, metric, pieces, off, X, bound)
+    along = _along(system, metric, pieces, off, bound)
     rows = _states(bound, X, along, V * metric.reach, decay(metric, pieces), lefts)
     e_end = min(float(V_end[0]), float(np.sqrt((rows[1][-1] ** 2).sum())) * SLACK)
     size = (metric.length(at_end(pieces[-1].linear)) + float(off[-1]) + e_end) * SLACK
@@ -62,56 +60,25 @@ def _largest(norm: Norm, rows: Array) -> float:
     return float(rows.max() if norm.largest else np.sqrt((rows**2).sum(axis=1)).max())
 
 
-def _along(
-    system: ExactSystem, metric: Metric, pieces: Sequence[Piece], off: Array, X: Array, bound: Majorant
-) -> Array:
-    """Bounds (N, n) of |R(x_lin, w)| over the cells: R itself in the middles of POINTS parts, R̄ for what is off."""
-    found, driven, cell, reach = [], X[:, system.n :].max(axis=1) > 0.0, 0, metric.reach
-    for piece, count, V in zip(pieces, counts(pieces, metric), off, strict=True):
-        values, bend = sampled(piece.linear, count * POINTS)
-        middle = np.zeros((X.shape[1], count * POINTS))
-        radius = np.zeros_like(middle)
-        middle[: system.n] = (values[:, :-1] + values[:, 1:]) / 2.0
-        radius[: system.n] = np.abs(values[:, 1:] - values[:, :-1]) / 2.0 + (bend + V * reach)[:, None]
-        for k in np.flatnonzero(np.repeat(driven[cell : cell + count], POINTS)).tolist():
-            at = arb(piece.begin) + arb(piece.duration) * (arb(k) + arb(0.5, 0.5)) / (count * POINTS)
-            w = system.inputs_at(piece.begin)(at)
-            middle[system.n :, k] = [float(v.mid()) for v in w]
-            near = middle[system.n :, k].tolist()
-            radius[system.n :, k] = [above(v - arb(c)) for v, c in zip(w, near, strict=True)]
-        sizes = np.abs(middle) * SLACK
-        total = bound(sizes)
-        here = np.abs(bound.expansion(middle)) + total * (SLACK - 1.0) + bound.tail(sizes, sizes)
-        moved = bound(sizes + radius) * SLACK - total + bound.tail(sizes + radius, radius)
-        found.append((here + moved).reshape(system.n, count, POINTS).max(axis=2).T)
-        cell += count
-    return np.concatenate(found) * SLACK
+def _along(system: ExactSystem, metric: Metric, pieces: Sequence[Piece], off: Array, bound: Majorant) -> Array:
+    """Bounds (N, n) of |R(x_lin, w)| over the cells: R itself in the middles of their parts, R̄ for what is off."""
+    middle, radius = middles(system, metric, [p.linear for p in pieces], pieces, off)
+    sizes = np.abs(middle) * SLACK
+    total = bound(sizes)
+    here = np.abs(bound.expansion(middle)) + total * (SLACK - 1.0) + bound.tail(sizes, sizes)
+    moved = bound(sizes + radius) * SLACK - total + bound.tail(sizes + radius, radius)
+    return np.asarray(largest_of_parts(here + moved) * SLACK)
 
 
 def _states(bound: Majorant, X: Array, along: Array, e: Array, flow: Decay, lefts: Sequence[Array]) -> list[Array]:
-    """Bounds (WINDOWS, n) of |left e| for each left, the first of which must be the unit matrix.
+    """Bounds (windows, n) of |left e| for each left, the first of which must be the unit matrix.
 
     X, along : bounds (N, n + m) of (x_lin, w) and (N, n) of R there, over the cells.  e : bounds (N, n) of |e|.
     """
-    ends = np.concatenate([[0.0], np.cumsum(flow.width)])
-    h, n = float(ends[-1]) / WINDOWS * SLACK, e.shape[1]
-    edges, at_X = h * np.arange(WINDOWS + 1), bound(X.T).T
-    kernel = _over(ends, flow.sizes(np.concatenate(lefts)), edges[:-1] - h, edges[1:])  # of t − s, t and s in windows
-    kernel = np.ascontiguousarray(kernel.transpose(1, 0, 2)).reshape(-1, WINDOWS * n)
+    gathered, at_X, n = convolution(flow, np.concatenate(lefts)), bound(X.T).T, e.shape[1]
     for _ in range(PASSES):
         moved = np.pad(e, ((0, 0), (0, X.shape[1] - n)))
         more = [bound.change(x, at, y[:, None])[:, 0] for x, at, y in zip(X, at_X, moved, strict=True)]
-        forced = _over(ends, along + np.array(more), edges[:-1], edges[1:])
-        back = forced[::-1].ravel()
-        found = np.stack([kernel[:, : (k + 1) * n] @ back[(WINDOWS - 1 - k) * n :] for k in range(WINDOWS)])
-        found *= h * SLACK
-        e = np.minimum(e, _over(edges, found[:, :n], ends[:-1], ends[1:]))
+        found = gathered(along + np.array(more))
+        e = np.minimum(e, gathered.by_cells(found[:, :n]))
     return np.split(found, len(lefts), axis=1)
-
-
-def _over(ends: Any, values: Array, begins: Any, stops: Any) -> Array:
-    """Largest of the cells' values (N, …) over each span from begins to stops (K,); cells end at ends (N + 1,)."""
-    room = (SLACK - 1.0) * ends[-1]
-    first = np.searchsorted(ends[1:], begins - room).clip(max=len(values) - 1)
-    after = np.searchsorted(ends[:-1], stops + room, side="right")
-    return np.array([values[i:j].max(axis=0) for i, j in zip(first.tolist(), after.tolist(), strict=True)])

@@ -11,14 +11,14 @@ import numpy as np
 
 from fmu_src.quantities import CORNER_WORDS, PARAMETERS, STATES
 
+from ..bertolino_baksa import bounded_certificate, rows_certificate
 from ..bertolino_baksa.adversary import long_enough, reference_floor
 from ..bertolino_baksa.balls import NotProvedError, precision
-from ..bertolino_baksa.bounded_certificate import KIND, BoundedCertificate
-from ..bertolino_baksa.bounded_certificate import certificate_of as bounded_of
-from ..bertolino_baksa.bounded_certificate import verify as verify_bounded
+from ..bertolino_baksa.bounded_certificate import BoundedCertificate
 from ..bertolino_baksa.cells import errors_of_states, outputs
 from ..bertolino_baksa.certificate import Certificate, certificate_of, opened, to_json, verify
 from ..bertolino_baksa.proof import Proof
+from ..bertolino_baksa.rows_certificate import RowsCertificate
 from ..bertolino_baksa.search import largest
 from ..bertolino_baksa.tube import Tube
 from ..car import car_form, road_signal
@@ -31,6 +31,7 @@ from ..trajectory import CERTIFICATE
 from ..tyres import static_loads_of
 from .car_bounded_roads import statement as every_road
 from .car_certificates import build, car_norms, certify_car, prove_reference
+from .car_sampled_roads import statement as sampled_roads
 from .certificate_words import model_words, named_by_content, refuse_exceeded, start_words
 from .directed import at_least, at_most
 from .exact_car import exact_car
@@ -79,10 +80,7 @@ def judge_certificate(path: Path) -> int:
         raise InputError(f"{path}: cannot be read: {error.strerror}") from error
     certificate = opened(data, str(path), _any_kind)
     try:
-        if isinstance(certificate, BoundedCertificate):
-            lines = every_road(certificate, verify_bounded(certificate, build))
-        else:
-            lines = statement(certificate, verify(certificate, build))
+        lines = _proved_anew(certificate)
     except NotProvedError as error:
         print(f"{path}: NOT proved: {error}")
         return 1
@@ -92,8 +90,22 @@ def judge_certificate(path: Path) -> int:
     return 0
 
 
-def _any_kind(content: dict[str, Any]) -> Certificate | BoundedCertificate:
-    return bounded_of(content) if content.get("kind") == KIND else certificate_of(content)
+def _any_kind(content: dict[str, Any]) -> Certificate | BoundedCertificate | RowsCertificate:
+    match content.get("kind"):
+        case bounded_certificate.KIND:
+            return bounded_certificate.certificate_of(content)
+        case rows_certificate.KIND:
+            return rows_certificate.certificate_of(content)
+        case _:
+            return certificate_of(content)
+
+
+def _proved_anew(certificate: Certificate | BoundedCertificate | RowsCertificate) -> list[str]:
+    if isinstance(certificate, BoundedCertificate):
+        return every_road(certificate, bounded_certificate.verify(certificate, build))
+    if isinstance(certificate, RowsCertificate):
+        return sampled_roads(certificate, rows_certificate.verify(certificate, build))
+    return statement(certificate, verify(certificate, build))
 
 
 def statement(certificate: Certificate, proof: Proof) -> list[str]:

@@ -17,7 +17,17 @@ from pathlib import Path
 
 import numpy as np
 
-from fmu_src.quantities import ACCELERATIONS, FORCES, PARAMETERS, ROAD, STATES, STRUT_TRAVELS, TABLE, TYRE_FORCES
+from fmu_src.quantities import (
+    ACCELERATIONS,
+    FORCES,
+    PARAMETERS,
+    ROAD,
+    ROAD_HEIGHTS,
+    STATES,
+    STRUT_TRAVELS,
+    TABLE,
+    TYRE_FORCES,
+)
 from fmu_src.road.profiles import HARMONICS, PROFILE
 from fmu_src.vehicle.parameters import Car
 
@@ -52,13 +62,7 @@ def read_export(path: Path, scenario: Scenario) -> tuple[Run, dict[str, Array]]:
     Raises InputError naming row and column of what cannot be one: gaps, times that do not rise, what is no number,
     columns that are missing or in another unit, parameters other than the scenario's.
     """
-    try:
-        with path.open(encoding="utf-8-sig", newline="") as file:
-            rows = list(csv.reader(file))
-    except (OSError, UnicodeDecodeError, csv.Error) as error:
-        raise InputError(f"{path}: cannot be read: {error}") from error
-    header = rows[0] if rows else []
-    names = [_name(cell, path) for cell in header]
+    rows, header, names = _table(path)
     if LOGGED in header:  # the car's log, in which the road is what was passed on a step ago
         names = ["" if name in {q.name for q in ROAD} else name for name in names]
     if missing := [name for name in ("time", *(q.name for q in STATES)) if name not in names]:
@@ -77,6 +81,36 @@ def read_export(path: Path, scenario: Scenario) -> tuple[Run, dict[str, Array]]:
     parameters = {"scenario": {**defaults, **scenario.parameters, **own}}
     record = {"scenario": scenario.as_json(), "parameters": parameters, "fmus": {}}
     return Run(trajectory=trajectory, record=record), rounding
+
+
+def read_heights(path: Path) -> tuple[Array, Array]:
+    """Times (N,) [s] and heights (N, 4) [m] under the wheels of a road's or a run's CSV.
+
+    Raises InputError naming row and column of what cannot be one, and unless it begins at t = 0.
+    """
+    rows, _, names = _table(path)
+    wanted = ["time", *(q.name for q in ROAD_HEIGHTS)]
+    if missing := [name for name in wanted if name not in names]:
+        raise InputError(f"{path}: row 1: wanted {', '.join(wanted)}, but {', '.join(missing)} are missing")
+    cells = _picked(rows, [names.index(name) for name in wanted], path)
+    trajectory = parsed(chain([wanted], cells), path)
+    if trajectory.time[0] != 0.0 or len(trajectory.time) < 2:
+        raise InputError(
+            f"{path}: row 2, column 'time': wanted 0 s, where the car rests, and further rows, got "
+            f"{trajectory.time[0]:g} s and {len(trajectory.time)} in all"
+        )
+    return trajectory.time, trajectory.columns(wanted[1:])
+
+
+def _table(path: Path) -> tuple[list[list[str]], list[str], list[str]]:
+    """All rows, the header, and what its cells are called here."""
+    try:
+        with path.open(encoding="utf-8-sig", newline="") as file:
+            rows = list(csv.reader(file))
+    except (OSError, UnicodeDecodeError, csv.Error) as error:
+        raise InputError(f"{path}: cannot be read: {error}") from error
+    header = rows[0] if rows else []
+    return rows, header, [_name(cell, path) for cell in header]
 
 
 def _name(cell: str, path: Path) -> str:

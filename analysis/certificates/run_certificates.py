@@ -11,6 +11,7 @@ import numpy as np
 from fmu_src.quantities import ACCELERATIONS, FORCES, ROAD_HEIGHTS, STATES
 
 from ..bertolino_baksa.balls import NotProvedError, precision
+from ..bertolino_baksa.input_rows import RowClass
 from ..bertolino_baksa.norms import proved_metric
 from ..bertolino_baksa.sampled import Samples
 from ..car import car_form, road_signal
@@ -29,7 +30,7 @@ from .exact_car import energy_norm, exact_system
 from .exported import BY_DEFAULT, SAMPLING, read_export
 from .falsification import Motions, Rows, judged, motions
 from .printed_times import input_within, moved, steepest
-from .unknown_roads import AllRoads, RoadClass, on_all_roads, samples
+from .unknown_roads import AllRoads, on_all_roads, samples
 from .unknown_roads import road_class as read_class
 
 DEFAULT = "bump"  # scenario of an export without one: the default car on the paper's bump
@@ -40,7 +41,7 @@ def certified_findings(
     run: Run,
     rounding: Mapping[str, Array] | None = None,
     file: str = "trajectory.csv",
-    roads: RoadClass | None = None,
+    roads: RowClass | None = None,
 ) -> tuple[list[Finding], str]:
     """Findings on a passive run on a profile of ours, or on any road of a class; if there are none, why.
 
@@ -96,7 +97,7 @@ def _on_its_road(run: Run, export: Export, file: str) -> tuple[list[Finding], st
 
 
 def _on_roads(
-    run: Run, export: Export, file: str, roads: RoadClass, heights: Array, rounding: Array
+    run: Run, export: Export, file: str, roads: RowClass, heights: Array, rounding: Array
 ) -> tuple[list[Finding], str]:
     allowed = export.own * scales(export.x) + export.digits
     fits = samples(export.times, export.x, allowed, heights, rounding, roads)
@@ -195,7 +196,7 @@ def _of_rows(export: Export, rows: Rows, file: str) -> Finding:
     )
 
 
-def _between_rows(run: Run, export: Export, rows: Rows, bound: float, roads: RoadClass | None) -> Finding:
+def _between_rows(run: Run, export: Export, rows: Rows, bound: float, roads: RowClass | None) -> Finding:
     """The bound is of the exact motion; the run's own error comes on top of it at its rows.
 
     On a class of roads x − x_lin is compared along the chords of the heights, and that of each road bounded.

@@ -16,6 +16,7 @@ from scipy.linalg import expm
 from fmu_src.quantities import ROAD_HEIGHTS
 
 from ..bertolino_baksa.balls import Array, ExactSystem, matrix, rounded
+from ..bertolino_baksa.input_rows import RowClass
 from ..bertolino_baksa.norms import Metric
 from ..bertolino_baksa.sampled import EPS, Between, Samples, between
 from ..bertolino_baksa.tube import input_matrix
@@ -27,31 +28,7 @@ TILTED = 6  # ψ2: heights enter (3.2)–(3.4) linearly, and (3.7) times cos ψ2
 SLACK = 1.0 + 1e-9  # for the roundings of times and heights
 
 
-@dataclass(frozen=True, slots=True)
-class RoadClass:
-    """All roads with |h''| ≤ bound [m/s²] between rows (kind "curv"), or |h'| ≤ bound [m/s] ("lip")."""
-
-    kind: str
-    bound: float
-
-    def __str__(self) -> str:
-        return f"{self.kind}:{self.bound:g}"
-
-    def between(self, steps: Array, slopes: Array, loose: Array) -> tuple[Array, Array, Array]:
-        """(N, 4) each: how far heights may be off the chords of these steps [s] and slopes [m/s], at most and on the
-        average of half a step, and how far rates may be; slopes are good to `loose`.
-        """
-        s, none = steps[:, None], np.zeros_like(slopes)
-        if self.kind == "curv":
-            return self.bound * s**2 / 8.0 + none, self.bound * s**2 / 12.0 + none, self.bound * s / 2.0 + loose
-        most = max(self.bound, 1e-300)
-        least, steepest = (np.clip((np.abs(slopes) + d) / most, 0.0, 1.0) for d in (-loose, loose))
-        peak = self.bound * s / 2.0 * (1.0 - least**2)
-        # it is off by at most (1 + slope/bound) bound times the time from the nearer row, and by the peak
-        return peak, peak * (1.0 + steepest) / 2.0, self.bound + np.abs(slopes)
-
-
-def road_class(text: str) -> RoadClass:
+def road_class(text: str) -> RowClass:
     """curv:H2 or lip:H1. Raises InputError for anything else."""
     kind, _, number = text.partition(":")
     try:
@@ -60,10 +37,10 @@ def road_class(text: str) -> RoadClass:
         bound = np.nan
     if kind not in ("curv", "lip") or not 0.0 <= bound < np.inf:
         raise InputError(f"--road-class {text}: wanted exact, curv:H2 [m/s^2] or lip:H1 [m/s]")
-    return RoadClass(kind, bound)
+    return RowClass(kind, bound)
 
 
-def samples(times: Array, x: Array, allowed: Array, heights: Array, rounding: Array, roads: RoadClass) -> Samples:
+def samples(times: Array, x: Array, allowed: Array, heights: Array, rounding: Array, roads: RowClass) -> Samples:
     """Rows and what the class leaves open between them.
 
     x, allowed : (N, 14), the rows' states and how far a motion may be off them.

@@ -22,6 +22,11 @@ def add_verbs(verbs: Any, scenario: str) -> None:
     kind.add_argument("--largest", action="store_true", help="also search the largest amplitude that can be certified")
     kind.add_argument("--closed-loop", action="store_true", help="under control for ever, and against no control")
     kind.add_argument("--bounded", type=float, metavar="A", help="every road with |h| <= A [m] instead, around rest")
+    sampled = "every road through the heights of this CSV instead (time, h_fl ... h_rr) that is of --road-class"
+    kind.add_argument("--sampled", type=Path, metavar="ROAD.csv", help=sampled)
+    verb.add_argument(
+        "--road-class", metavar="CLASS", help="between rows: curv:H2 (|h''| <= H2) or lip:H1 (|h'| <= H1)"
+    )
     verb.add_argument("--slope", type=float, metavar="V", help="with --bounded: roads with |dh/dt| <= V [m/s] too")
     verb.set_defaults(do=_certify)
 
@@ -50,6 +55,12 @@ def _certify(options: argparse.Namespace) -> int:
         print("[start] is left out: x_lin is that from rest; certify RUN takes a run's own start.", file=sys.stderr)
     if options.slope is not None and options.bounded is None:
         raise InputError(f"--slope {options.slope!r}: wanted --bounded with it")
+    if (options.sampled is None) is not (options.road_class is None):
+        raise InputError("wanted both --sampled and --road-class, or neither: rows say nothing of the road between")
+    if options.sampled is not None:
+        from .car_sampled_roads import command as through_rows
+
+        return through_rows(scenario.parameters, options.sampled, options.road_class, options.out)
     if options.bounded is not None:
         from .car_bounded_roads import command
 
@@ -70,7 +81,8 @@ def _certify(options: argparse.Namespace) -> int:
 def _certify_run(folder: Path, options: argparse.Namespace) -> int:
     from .certified_run import certify_run
 
-    if options.out or options.quick or options.largest or options.closed_loop or options.bounded is not None:
+    others = options.bounded, options.sampled, options.road_class
+    if options.out or options.quick or options.largest or options.closed_loop or any(o is not None for o in others):
         raise InputError(f"{folder}: a run folder is certified without options; for them give {folder / RECORD}")
     if reason := certify_run(read_run(folder), folder):
         print(f"no certificate: {reason}")

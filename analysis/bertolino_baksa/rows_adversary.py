@@ -1,0 +1,68 @@
+"""How far motions really get on inputs of a class through given rows: no proof, a number beside every proved one.
+
+The inputs leave the chords between rows as far as the class lets them: not at all, to sides by chance, and for each
+mode of the linear part to the sides that drive it in resonance, at PHASES.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from ..methods.modes import modes
+from ..methods.standard_form import StandardForm
+from .adversary import STEP, stepped
+from .balls import Array
+from .input_rows import InputRows, RowClass
+from .norms import Norm
+
+PHASES = np.arange(8) * np.pi / 4.0
+
+
+def reached(form: StandardForm, norms: Sequence[Norm], rows: InputRows, x0: Array) -> Array:
+    """sup N(x − x_lin) (norms,) over these inputs, x and x_lin from x0 (n,)."""
+    signs = _signs(form, rows)
+    x = z = np.repeat(x0[:, None], signs.shape[2], axis=1)
+    found = np.zeros(len(norms))
+    for h, inputs in _steps(rows, signs):
+        x = stepped(form.rate, x, h, *inputs)
+        z = stepped(lambda y, w: form.A @ y + form.B @ w, z, h, *inputs)
+        found = np.maximum(found, [norm(x - z).max() for norm in norms])
+    return found
+
+
+def _signs(form: StandardForm, rows: InputRows) -> Array:
+    """Sides (steps, k, K) to which the heights leave the chords of the steps: −1, 0 or 1."""
+    steps, k = rows.slopes.shape
+    linear, middle = modes(form.A), (rows.times[:-1] + rows.times[1:]) / 2.0
+    chance = np.random.default_rng(0).choice([-1.0, 1.0], (steps, k))
+    found = [np.zeros((steps, k)), chance]
+    for rate, row in zip(linear.eigenvalues, linear.K_inverse @ form.B[:, :k], strict=True):
+        if rate.imag > 0.0:
+            found += [np.sign(np.real(np.exp(1j * (phase - rate.imag * middle))[:, None] * row)) for phase in PHASES]
+    return np.stack(found, axis=2)
+
+
+def _steps(rows: InputRows, signs: Array) -> Iterator[tuple[float, list[Array]]]:
+    """Steps [s] no longer than STEP, two or more from row to row, and w (m, K) at begin, middle and end of each."""
+    widths, ones = np.diff(rows.times), np.ones(signs.shape[2])
+    for width, heights, slope, side in zip(widths.tolist(), rows.heights, rows.slopes, signs, strict=False):
+        parts = 2 * int(np.ceil(width / (2.0 * STEP)))
+        h = width / parts
+        for part in range(parts):
+            inputs = []
+            for s in (0.0, 0.5, 1.0):
+                up, rate = bow(rows.between, width, (part + s) * h, (part + 0.5) * h, slope[:, None])
+                height = heights[:, None] + (part + s) * h * slope[:, None] + side * up
+                inputs.append(np.concatenate([height * ones, slope[:, None] + side * rate]))
+            yield h, inputs
+
+
+def bow(between: RowClass, width: float, s: float, inside: float, slope: Array) -> tuple[Array, Array]:
+    """The largest height over a chord of this slope that the class has at s in all of a step at once, or nearly so, and
+    its rate; `inside` tells on which side of a corner s lies."""
+    if between.kind == "curv":
+        return between.bound * s * (width - s) / 2.0 + 0.0 * slope, between.bound * (width / 2.0 - s) + 0.0 * slope
+    rate = np.maximum(between.bound - np.abs(slope), 0.0)
+    return rate * min(s, width - s), rate * (1.0 if inside < width / 2.0 else -1.0)

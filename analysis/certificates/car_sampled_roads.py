@@ -1,0 +1,101 @@
+"""`python -m analysis certify SCENARIO --sampled ROAD.csv --road-class CLASS`: all roads of a class through rows."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import numpy as np
+
+from fmu_src.quantities import STATES
+
+from ..bertolino_baksa.balls import Array, NotProvedError
+from ..bertolino_baksa.cells import errors_of_states
+from ..bertolino_baksa.certificate import motion
+from ..bertolino_baksa.input_rows import InputRows
+from ..bertolino_baksa.norms import Norm
+from ..bertolino_baksa.proof import Proof
+from ..bertolino_baksa.rows_adversary import reached
+from ..bertolino_baksa.rows_certificate import RowsCertificate, certify, to_json
+from ..car import car_form
+from ..files import write_whole
+from ..reference import Parameters, car_of
+from .car_bounded_roads import flat
+from .car_certificates import build, metric_of
+from .certificate_words import model_words, named_by_content, refuse_exceeded, start_words
+from .directed import at_least, at_most
+from .exact_car import norms
+from .exported import read_heights
+from .unknown_roads import road_class
+
+
+def command(parameters: Parameters, road: Path, roads: str, where: Path | None) -> int:
+    """Certify x_lin from rest on every road of the class through the file's heights; 0, or 1 if nothing is proved.
+
+    Raises InputError for a file that holds no road, and for an unknown class.
+    """
+    rows = InputRows(*read_heights(road), road_class(roads))
+    print(f"Finding and proving a motion to t = {rows.times[-1]:g} s ...", file=sys.stderr, flush=True)
+    try:
+        certificate, proof = certify_rows(parameters, rows)
+        lines = statement(certificate, proof)
+    except NotProvedError as error:
+        print(f"no certificate of all these roads: {error}")
+        return 1
+    for line in lines:
+        print(line)
+    if where is not None:
+        write_whole(where, to_json(certificate))
+        print(f"{where}: written")
+    return 0
+
+
+def certify_rows(parameters: Parameters, rows: InputRows) -> tuple[RowsCertificate, Proof]:
+    """The certificate of x_lin from rest for this car. Raises NotProvedError, with the reason, if there is none."""
+    car = car_of(parameters)
+
+    def named(x_lin: Array) -> tuple[Norm, ...]:
+        return norms(car, x_lin)
+
+    return certify(flat(parameters), build, metric_of(car), named, rows, np.zeros(14))
+
+
+def statement(certificate: RowsCertificate, proof: Proof) -> list[str]:
+    """What is proved, each number beside what roads of the class reach.
+
+    Raises NotProvedError if that exceeds it, or where the inputs are not the car's road.
+    """
+    model, rows = certificate.model, certificate.rows
+    car, gain = car_of(model["parameters"]), model.get("gain")
+    form = car_form(car, gain=None if gain is None else np.array(gain))
+    claims = named_by_content(certificate.claims, norms(car, motion(certificate.pieces)))
+    most = reached(form, [claim.norm for claim in claims], rows, certificate.x0)
+    start, last = start_words(certificate.x0), float(rows.times[-1])
+    lines = [
+        f"x_lin {start} is almost stable (definition 2.1) until t = {last:g} s on every road of class {rows.between} "
+        f"through {len(rows.times)} rows of heights: for every eps >= l,"
+    ]
+    for claim, far in zip(claims, most.tolist(), strict=True):
+        refuse_exceeded(claim, far)
+        epsilon, delta = claim.table[-1].tolist()
+        ratio = f": ratio {claim.floor / far:.3f}" if far else ""
+        lines.append(
+            f"  {claim.norm.name} norm: l <= {at_most(claim.floor, 6)} (roads of the class reach {far:.6g}{ratio}); "
+            f"delta up to {at_least(delta)}, at eps = {at_most(epsilon)}"
+        )
+    return [*lines, *model_words(model, road=False), *_along(proof, start)]
+
+
+def _along(proof: Proof, start: str) -> list[str]:
+    """Of the motions from x0 alone: |x − x_lin|, and how far x_lin itself is left open by the road."""
+    assert proof.open is not None
+    e = errors_of_states(proof.tube, proof.metric) + proof.open.rows(np.eye(14)).max(axis=0)
+    words = (
+        ", ".join(f"{q.name} {at_most(v, 3)} {q.unit}" for q, v in zip(STATES[:7], values.tolist(), strict=False))
+        for values in (e, proof.open.linear.max(axis=0))
+    )
+    return [
+        f"  of the motion {start} itself, on every such road:",
+        f"    |x - x_lin| at most {next(words)}",
+        f"    x_lin is off that of the file's polynomials by at most {next(words)}",
+    ]
