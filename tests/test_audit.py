@@ -15,7 +15,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from analysis import __main__ as command_line
-from analysis.audit import averaging, car, document, resonance, response, rows, section2
+from analysis.audit import averaging, car, document, resonance, response, rows, section2, section3
 from analysis.audit.differences import CONVENTION, differences
 from analysis.audit.document import Audit
 from analysis.audit.rows import MISPRINT, REFUTED, RIGHT, Evidence, Row
@@ -167,14 +167,28 @@ def test_power_from_nowhere_is_the_misprints_own_power() -> None:
 
 def test_what_the_misprints_do_to_the_response_is_linear() -> None:
     """The nonlinear runs differ as their linear parts do, which are known in closed form."""
-    times, both = response.TIMES[:400:8], response.responses()
+    shown = slice(None, 8000, 160)  # 40 ms apart, for 2 s
+    times, both = response.TIMES[shown], response.responses()
     wrong, right = (make("A").linear_over_the_bump(times, response.HEIGHT)[:, :7] for make in (printed, derived))
-    off = (both["printed"] - both["derived"])[:400:8]
+    off = (both["printed"] - both["derived"])[shown]
     assert_allclose(off / np.abs(right).max(axis=0), (wrong - right) / np.abs(right).max(axis=0), atol=1e-3)
     deviations = response.deviations()
     by_name = {d.quantity.name: d.difference for d in deviations}
     assert by_name["body.roll"] == max(by_name.values())
     assert by_name["body.roll"] > 0.4 and max(sorted(by_name.values())[:-1]) < 0.06
+
+
+def test_maxima_are_those_of_a_finer_grid() -> None:
+    """Peaks, differences, the least l and the cubic accelerations, against rows of 40 µs."""
+    fine = np.linspace(0.0, 1.0, 25001)
+    right, wrong = (make("A").over_the_bump(fine, response.HEIGHT)[:, :7] for make in (derived, printed))
+    deviations, peaks = response.deviations(), np.abs(right).max(axis=0)
+    assert_allclose([d.derived for d in deviations], peaks, rtol=1e-4)
+    assert_allclose([d.printed for d in deviations], np.abs(wrong).max(axis=0), rtol=1e-4)
+    assert_allclose([d.difference for d in deviations], np.abs(wrong - right).max(axis=0) / peaks, rtol=3e-4)
+    assert_allclose(section2.least_l(car.CROSSING), section2.least_l(fine), rtol=5e-4)
+    found, finer = (sum(section3.cubic_accelerations(times), []) for times in (car.CROSSING, fine))
+    assert_allclose(found[:4], finer[:4], rtol=1e-3)
 
 
 def test_both_cars_decay_as_their_eigenvalues_say() -> None:

@@ -13,12 +13,12 @@ from ..derivation import derive
 from . import assumptions, printed_car
 from .differences import CONVENTION, Difference, differences, plain
 from .rows import RIGHT, Evidence, Row
-from .system import Array, System, derived, energy, planted, power_residual, printed
+from .system import SAMPLING, Array, System, derived, energy, planted, power_residual, printed
 
 SAMPLE = 200
 ROUND_OFF = 1e-12
 BUMPS = PARAMETERS["A"].start * np.array([1.0, 2.0, 4.0])  # m
-CROSSING = np.linspace(0.0, 0.6, 121)  # s, holds the peaks of the wheels
+CROSSING = np.linspace(0.0, 0.6, round(0.6 / SAMPLING) + 1)  # s, holds the peaks of all states
 
 
 def rows() -> list[Row]:

@@ -18,10 +18,10 @@ from ..derivation import derive
 from . import printed_car
 from .differences import CONVENTION, derived_equations
 from .rows import REFUTED, Evidence, Row
-from .system import SMALL, Array, System, bump, derived, energy, printed
+from .system import SAMPLING, SMALL, Array, System, bump, derived, energy, printed
 
 HEIGHT = QUANTITIES["A"].start  # m
-TIMES = np.linspace(0.0, 6.0, 1201)  # s
+TIMES = np.linspace(0.0, 6.0, round(6.0 / SAMPLING) + 1)  # s
 LONG = 60.0  # s
 CARS, SPREAD = 15, 0.3  # besides the default car; each parameter within ± SPREAD of its default, evenly
 HEIGHTS = (1.0, 10.0)  # of the bump, over HEIGHT

@@ -21,6 +21,7 @@ from . import printed_car
 from .differences import SIGNS, Difference, derived_equations
 
 Array = NDArray[np.float64]
+SAMPLING = 2.5e-4  # s between the times at which maxima are looked for; the fastest mode takes 75 ms, so 1e-4 is missed
 SMALL = dict.fromkeys([*derive().q, *derive().v, *derive().a, *derive().h], sp.S.Zero)
 
 
