@@ -174,7 +174,7 @@ def test_the_closed_form_is_what_an_integration_gives(profile: str) -> None:
     expected = integrated(form, x0, w, w.edges, times)
     found = linear_response(form.A, form.B, x0, w, times)
     np.testing.assert_allclose(found, expected, atol=1e-9 * np.abs(expected).max())
-    free = linear_response(form.A, form.B, x0, constant(np.zeros(8)), times)
+    free = linear_response(form.A, form.B, x0, constant([0.0] * 8), times)
     assert np.abs(found - free).max() > 0.1 * np.abs(found).max()  # the road is seen, not only the start
 
 

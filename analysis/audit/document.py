@@ -14,7 +14,7 @@ from tqdm import tqdm
 
 from ..figures import BLUE, DASHED, READING, RED, Axes, Subject, axis_label, finish, readable, render, words
 from ..files import write_whole
-from . import averaging, car, resonance, response, section2, section3, section4
+from . import averaging, car, resonance, response, section2, section3, section4, senses
 from .differences import CONVENTION, differences
 from .response import Deviation
 from .rows import Evidence, Row
@@ -45,7 +45,8 @@ class Audit:
 def audit(progress: bool = False) -> Audit:
     """Everything computed anew; takes most of a minute."""
     sections: list[Callable[[], list[Row]]] = [
-        section2.rows, car.rows, section3.rows, averaging.rows, resonance.rows, response.rows, section4.rows
+        section2.rows, car.rows, section3.rows, averaging.rows, resonance.rows, response.rows, section4.rows,
+        senses.rows,
     ]  # fmt: skip
     runs = [partial(response.remainder, *run) for run in response.runs()]  # kept by their cache
     todo: list[Callable[[], Any]] = [*runs, car.in_convention_a, *sections]
@@ -83,12 +84,15 @@ def as_json(result: Audit) -> dict[str, Any]:
 
 # ------------------------------------------------------------------ words
 NOISE = 1e-5  # numbers that are only known to be below a tolerance as small as this are written so
+ROUND_OFF = 1e-12
 
 
 def shown(e: Evidence, value: float) -> str:
-    """A number to three digits, a count in full; round-off, as below its tolerance."""
+    """A number to three digits, a count in full; round-off, as below its tolerance, or below ROUND_OFF."""
     if e.expected == 0.0 and abs(value) <= e.tolerance and 0.0 < e.tolerance < NOISE:
         return f"< {e.tolerance:g}".replace("-", "−")
+    if 0.0 < abs(value) < ROUND_OFF:
+        return f"< {ROUND_OFF:g}".replace("-", "−")
     return readable(value, 6 if value.is_integer() else 3)
 
 
