@@ -150,12 +150,12 @@ def _power_balance() -> Any:
     return sp.lambdify([*d.parameters, *d.q, *d.v, *d.a, *d.h, *d.dh], [rate, road_power, dissipation], cse=True)
 
 
-def power_residual(system: System, q: Array, v: Array, h: Array, dh: Array) -> Array:
-    """Power that comes from nowhere, dE/dt − road + dissipation, over |road| + dissipation, in each column."""
+def power_residual(system: System, q: Array, v: Array, h: Array, dh: Array) -> tuple[Array, Array]:
+    """Power that comes from nowhere, dE/dt − road + dissipation, and |road| + dissipation [W], in each column."""
     s = system.sign[:, None]
     a = system.accelerations(q, v, h)
     rate, road_power, lost = _power_balance()(*_numbers(system.car), *(s * q), *(s * v), *(s * a), *h, *dh)
-    return (rate - road_power + lost) / (np.abs(road_power) + lost)
+    return rate - road_power + lost, np.abs(road_power) + lost
 
 
 @cache
