@@ -284,8 +284,8 @@ def _condition() -> Row:
         evidence=[
             Evidence(
                 measure="error, all k together, of what is compared with 0 as the rate at which perturbations grow, "
-                "over the change of the exponents that the road makes, both by the full equations (Floquet); default car, "
-                f"sine road of {1e3 * height:g} mm under the front left wheel",
+                "over the change of the exponents that the road makes, both by the full equations (Floquet); default "
+                f"car, sine road of {1e3 * height:g} mm under the front left wheel",
                 printed=error(compared),
                 derived=error(compared.real.astype(complex)),
                 unit="1",
