@@ -18,7 +18,21 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
 from analysis import __main__ as command_line
-from analysis.audit import averaging, car, document, permanent, resonance, response, rows, section2, section3, section4
+from analysis.audit import (
+    amplitude_equation,
+    averaging,
+    car,
+    document,
+    modal,
+    permanent,
+    resonance,
+    response,
+    rows,
+    section2,
+    section3,
+    section4,
+    small_parameter,
+)
 from analysis.audit.differences import CONVENTION, derived_equations, differences
 from analysis.audit.document import Audit
 from analysis.audit.rows import FAILS, INSPECTION, MISPRINT, READING, REFUTED, RIGHT, Evidence, Row
@@ -32,9 +46,9 @@ EXPECTED = {
     MISPRINT: [
         *["definition 2.1", "(2.10)", "(2.12) and below it", "(2.13)", "(2.14)"],
         *["e = R i", *SEVEN, "(3.1)–(3.7)", "list after (3.7)", "(3.4), (3.7)"],
-        *["R̄_i", "C̄_i, R̄_i", "(3.13)", "after (3.14)", "§3.4, h12, h22"],
+        *["R̄_i", "C̄_i, R̄_i", "(3.13)", "after (3.14)"],
         *["before (3.20), (3.20)", "(3.20) R̄_i", "(3.20) A_i", "(3.20) B_i", "amplitude equation after (3.20)"],
-        *["condition after (3.20)", "(4.1) A", "(4.1) B"],
+        *["condition after (3.20)", "§3.4, h12, h22", "(4.1) A", "(4.1) B"],
     ],
     FAILS: [
         *["(2.10) with assumption 1", "between (2.13) and (2.14)", "after (2.14)"],
@@ -42,11 +56,14 @@ EXPECTED = {
     ],
     READING: ["§3.4, ε = 0.01", "§4, c1, c2, b1, b2", "§4, φ"],
     RIGHT: [
-        *["(2.6), (2.7)", "(3.1)–(3.7)", "(3.1)–(3.7)", "(3.8)", "(3.17)"],
+        *["(2.6), (2.7)", "(3.1)–(3.7)", "(3.1)–(3.7)", "(3.8)", "(3.14)", "(3.15), (3.16)", "(3.17)", "(3.18)"],
         *["(4.1) with B as printed", "(4.1) C", "remark 4.1"],
     ],
     REFUTED: ["P_i(t, ξ), B_νij, B_νijk", "§3.4, figures 3, 4"],
-    INSPECTION: ["(2.5)"],
+    INSPECTION: [
+        *["(2.5)", "footnote 1", "§3.3, its title and first sentence", "before (3.18)"],
+        "before the condition after (3.20)",
+    ],
 }
 
 
@@ -307,11 +324,25 @@ def test_static_loads_that_do_not_cancel_are_seen(monkeypatch: pytest.MonkeyPatc
 
 def test_the_condition_is_judged_by_rates_of_growth_that_know_nothing_of_it(monkeypatch: pytest.MonkeyPatch) -> None:
     """Another A than the corrected one is not confirmed; nor is ∫ by another right side of (3.20)."""
-    assert averaging._condition().holds and averaging._limit().holds
+    assert amplitude_equation._condition().holds and averaging._limit().holds
     corrected = averaging.A_corrected
     for wrong in (lambda *x: 7.0 * corrected(*x) + 1j, lambda *x: 1.01 * corrected(*x)):
         monkeypatch.setattr(averaging, "A_corrected", wrong)
-        assert not averaging._condition().holds and not averaging._limit().holds
+        monkeypatch.setattr(amplitude_equation, "A_corrected", wrong)
+        assert not amplitude_equation._condition().holds and not averaging._limit().holds
+
+
+def test_a_misprint_in_3_14_to_3_18_would_be_seen(monkeypatch: pytest.MonkeyPatch) -> None:
+    """One of the three products of (3.16) left out; α turned to another mode."""
+    x = averaging.textbook(*averaging.QUIET)
+
+    def two_products(x: averaging.Textbook, xi: Any) -> Any:
+        return small_parameter.by_print(x, xi) - [0.0 * xi[0], small_parameter.cube(x, xi[1], xi[0], xi[0])]
+
+    assert small_parameter.order_left(x, two_products) == pytest.approx(2.0, abs=0.1)
+    wrong = np.roll(modal.by_the_letter()[0], 1, axis=0), modal.by_the_letter()[1]
+    monkeypatch.setattr(modal, "by_the_letter", lambda: wrong)
+    assert not modal._nonlinear().holds
 
 
 def test_the_cubic_criterion_is_right_on_systems_drawn_at_random(rng: np.random.Generator) -> None:

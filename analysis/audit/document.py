@@ -14,7 +14,7 @@ from tqdm import tqdm
 
 from ..figures import BLUE, DASHED, READING, RED, Axes, Subject, axis_label, finish, readable, render, words
 from ..files import write_whole
-from . import averaging, car, resonance, response, section2, section3, section4, senses
+from . import amplitude_equation, averaging, car, resonance, response, section2, section3, section4, senses
 from .differences import CONVENTION, differences
 from .response import Deviation
 from .rows import Evidence, Row
@@ -45,8 +45,8 @@ class Audit:
 def audit(progress: bool = False) -> Audit:
     """Everything computed anew; takes most of a minute."""
     sections: list[Callable[[], list[Row]]] = [
-        section2.rows, car.rows, section3.rows, averaging.rows, resonance.rows, response.rows, section4.rows,
-        senses.rows,
+        section2.rows, car.rows, section3.rows, averaging.rows, amplitude_equation.rows, resonance.rows,
+        section3.road_rows, response.rows, section4.rows, senses.rows,
     ]  # fmt: skip
     runs = [partial(response.remainder, *run) for run in response.runs()]  # kept by their cache
     todo: list[Callable[[], Any]] = [*runs, car.in_convention_a, *sections]

@@ -1,4 +1,4 @@
-"""§3.2 and §3.4: evidence on the quasi-linear equations of the default car, and on its road."""
+"""§3.2 to §3.4 but for the averaging: the quasi-linear equations of the default car, and its road."""
 
 from __future__ import annotations
 
@@ -15,19 +15,28 @@ from fmu_src.vehicle.parameters import Car
 from ..derivation import COORDINATES, derive
 from ..figures import readable
 from ..quasilinear import TERMS, quasilinear
-from . import modal, printed_car
+from . import modal, printed_car, small_parameter
 from .car import CROSSING, discrepancy_order
 from .differences import CONVENTION, derived_equations
 from .modal import cubic_part, form
-from .rows import READING, REFUTED, Evidence, Row
+from .rows import INSPECTION, READING, REFUTED, Evidence, Row
 from .system import SMALL, Array, bump, derived
 
 SIZES = np.array([0.04, 0.02, 0.01])
 
 
 def rows() -> list[Row]:
-    """§3.2 to §3.4 but for the averaging, in the order of the paper."""
-    return [_autonomous(), _stiffness(), _parametric(), *modal.rows(), _parameter(), _delay()]
+    """§3.2, and §3.3 up to the averaging, in the order of the paper."""
+    return [
+        *[_autonomous(), _stiffness(), _footnote(), *modal.rows()],
+        *[small_parameter.neglected(), small_parameter.series(), _parametric(), modal.steady()],
+        *[small_parameter.transformed(), small_parameter.amplitudes()],
+    ]
+
+
+def road_rows() -> list[Row]:
+    """Parameters and road of §3.4."""
+    return [_parameter(), _delay()]
 
 
 CUBIC = ("c_ijkl", "b_ijkl", "m_ijkl")  # stiffness, damping, inertia
@@ -105,6 +114,16 @@ def _stiffness() -> Row:
             ),
         ],
         note=f"Largest on the bump: stiffness {sizes[0]:.2g}, damping {sizes[1]:.2g}, inertia {sizes[2]:.2g} rad/s².",
+    )
+
+
+def _footnote() -> Row:
+    return Row(
+        equation="footnote 1",
+        printed="b_ij, b̄_ijkl, m_ij, m̄_ijkl, d_ij, d̄_ijkl",
+        derived="b̄_ij, b̄_ijkl, c̄_ij, m̄_ijkl, d̄_ij, d_ijkl: m_ij is nowhere defined (M̃ is divided out in (3.9)), c̄_ij "
+        "is left out",
+        kind=INSPECTION,
     )
 
 
