@@ -69,7 +69,7 @@ def _turning_energy_error(to_fixed: sp.Matrix) -> float:
 
 def rows() -> list[Row]:
     """The rest, in the order of the paper."""
-    return [_unused(), _axle_masses(), _gravity(), _form()]
+    return [_unused(), _axle_masses(), _gravity(), form()]
 
 
 def _unused() -> Row:
@@ -183,7 +183,7 @@ def _gravity() -> Row:
     )
 
 
-def _form() -> Row:
+def form() -> Row:
     """(3.8): linear in q̈, of second degree in q̇ where inertia is, of first where dampers are, linear in h."""
 
     def left(equations: sp.Matrix) -> float:

@@ -150,7 +150,9 @@ HEAD = f"""# The paper audited
 Written by `{COMMAND}`; a test compares every row with what the command gives. The changes to the
 seven equations were found by symbolic difference from the Lagrangian of the car. Under “evidence” stand the numbers
 that decide, each for the printed and for the derived form; of a claim that is refuted, for the printed and for the
-derived system. Lengths in m, angles in rad, SI units throughout; the car is the default one, which is representative
+derived system; of what is right if read so, for the nearest reading and for that one. A condition or sentence “does not
+hold” where a formula would be a misprint. What is decided “by inspection” contradicts itself or what stands beside it,
+and has no number. Without rows: (3.9)–(3.12), which define, and (2.8), (2.9), (2.11), (3.19), which assume. Lengths in m, angles in rad, SI units throughout; the car is the default one, which is representative
 of its class and not the paper's.
 """
 
@@ -171,7 +173,8 @@ def markdown(result: Audit) -> str:
         "Default car and bump (10 mm); the undefined m_z of (3.4) taken as m2; ψ2 of the print in the sense in which "
         "its road term drives it.",
         _table(*_split(_response_table(result))),
-        "The command draws beside this page:\n\n" + figures,
+        "The command also draws these, into the folder that it is given; the repository holds this page alone:\n\n"
+        + figures,
     ]
     return "\n\n".join(parts) + "\n"
 
