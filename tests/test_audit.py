@@ -193,6 +193,8 @@ def test_power_from_nowhere_is_the_misprints_own_power() -> None:
         assert_allclose(residual, power, atol=1e-10 * turnover.max())
         expected = np.abs(power).sum() / turnover.sum()
         assert [car.power_from_nowhere(system, seed) for seed in (1, 2, 3)] == pytest.approx([expected] * 3, rel=0.1)
+        if expected > 0.0 and (even := car.evenness(system)) > 1e-12:
+            assert [car.evenness(system, seed) for seed in (1, 2, 3)] == pytest.approx([even] * 3, rel=0.1)
 
 
 def test_what_the_misprints_do_to_the_response_is_linear() -> None:

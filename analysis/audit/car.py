@@ -81,11 +81,11 @@ def stiffness_asymmetry(system: System) -> float:
     return float(np.abs(K - K.T).max() / np.abs(K).max())
 
 
-def evenness(system: System) -> float:
-    """Even part of the accelerations, over their size, largest over coordinates and the sample."""
-    q, v, h, _ = sample()
+def evenness(system: System, seed: int = SEED) -> float:
+    """Even part of the accelerations over the odd one, each summed over the sample, largest over coordinates."""
+    q, v, h, _ = sample(seed)
     there, back = system.accelerations(q, v, h), system.accelerations(-q, -v, -h)
-    return float((np.abs(there + back).max(axis=1) / np.abs(there - back).max(axis=1)).max())
+    return float((np.abs(there + back).sum(axis=1) / np.abs(there - back).sum(axis=1)).max())
 
 
 def force_on_tilted_road(system: System) -> float:
@@ -103,7 +103,7 @@ def undefined_symbols(system: System) -> float:
     return float(len(system.equations.free_symbols - known))
 
 
-EVENNESS = "even part of the accelerations of an odd system, over their size"
+EVENNESS = "even part of the accelerations, summed over motions drawn at random, over the odd one, of an odd system"
 LAWS: dict[str, tuple[Callable[[System], float], str, float, float]] = {
     "symbols that the nomenclature does not have": (undefined_symbols, "1", 0.0, 1.0),
     "power from nowhere, summed over motions drawn at random, over that of road and dampers": (
