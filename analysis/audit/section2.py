@@ -64,10 +64,10 @@ def _perturbed() -> Row:
 
 
 def least_l(times: Array) -> tuple[float, float]:
-    """Largest |x − ψ| of the default car at these times on a bump of 10 mm, ψ = 0 and ψ = x_lin."""
+    """Largest |x − ψ| over each state's |x_lin|, default car at these times on a bump of 10 mm; ψ = 0 and ψ = x_lin."""
     car = derived("A")
     x, linear = car.over_the_bump(times, 0.01), car.linear_over_the_bump(times, 0.01)
-    size = np.abs(x).max(axis=0)
+    size = np.abs(linear).max(axis=0)
     return float((np.abs(x) / size).max()), float((np.abs(x - linear) / size).max())
 
 
@@ -80,7 +80,7 @@ def _definition() -> Row:
         derived="a function ψ(t): the definition is applied to (2.3), which is not 0",
         evidence=[
             Evidence(
-                measure="largest |x − ψ| of the car on the bump, over each state's maximum, with ψ = 0 and ψ = x_lin",
+                measure="largest |x − ψ| of the car on the bump, over each state's largest |x_lin|, with ψ = 0 and ψ = x_lin",
                 printed=rest,
                 derived=linear,
                 unit="1",
