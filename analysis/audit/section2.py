@@ -80,7 +80,8 @@ def _definition() -> Row:
         derived="a function ψ(t): the definition is applied to (2.3), which is not 0",
         evidence=[
             Evidence(
-                measure="largest |x − ψ| of the car on the bump, over each state's largest |x_lin|, with ψ = 0 and ψ = x_lin",
+                measure="largest |x − ψ| of the car on the bump, over each state's largest |x_lin|, with ψ = 0 and "
+                "ψ = x_lin",
                 printed=rest,
                 derived=linear,
                 unit="1",
