@@ -50,7 +50,8 @@ def page(title: str, command: str, numbers: Quasilinear, modes: Sequence[Sequenc
             "",
             *_table(modes),
             "",
-            f"The same command draws the car in its seven modes: `{picture}`, beside this page.",
+            f"The same command draws the car in its seven modes, into the folder that it is given: `{picture}`; the "
+            "repository holds this page alone.",
             "",
             PROOF,
             *(line for name in TERMS for line in _section(name, formulas[name], numbers[name])),

@@ -57,7 +57,7 @@ def test_both_claims_hold_on_honest_runs(name: str) -> None:
     size, order, *each = check(run)[2 : 4 + len(STATES)]
     assert size.holds and size.measured > 30.0 * size.tolerance  # it is seen, not lost in the tolerance
     assert order.holds and order.measured == pytest.approx(3.0, abs=0.01)
-    assert "axle_r.roll at t = 0." in order.source
+    assert "14 of 14 states are told" in order.source and "up to 5, 10, 20 mm" in order.claim
     away = np.abs(run.trajectory.columns(NAMES) - linear_states(run))
     for k, finding in enumerate(each):
         assert NAMES[k] in finding.claim and f"[{STATES[k].unit}]" in finding.claim and finding.holds
@@ -125,6 +125,21 @@ def test_an_order_other_than_3_fails(monkeypatch: pytest.MonkeyPatch) -> None:
 
     monkeypatch.setattr(discrepancy, "_motion", unscaled_start)
     assert not check(run)[3].holds
+
+
+def test_a_single_state_of_another_order_fails_by_its_name(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A small quadratic term in a front wheel's heave, such as the printed (3.2) makes."""
+    run, motion = run_at("bump", 1.0), discrepancy._motion
+    wheel = NAMES.index("wheel_fl.heave")
+
+    def bent(run: Run, forces: Any, switches: Any, x0: Any, times: Any, factor: float) -> Any:
+        states = motion(run, forces, switches, x0, times, factor)
+        states[:, wheel] += 1e-8 * factor**2
+        return states
+
+    monkeypatch.setattr(discrepancy, "_motion", bent)
+    order = check(run)[3]
+    assert not order.holds and "column wheel_fl.heave;" in order.source
 
 
 @pytest.mark.parametrize(

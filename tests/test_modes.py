@@ -85,6 +85,16 @@ def test_discs_that_touch_leave_no_gap() -> None:
     assert Enclosures(np.array([0.0j, 1.0]), np.array([0.4, 0.5])).touching == 0
 
 
+def test_the_abscissa_counts_the_radius_of_every_disc() -> None:
+    """A wide disc may reach further right than the one whose centre is furthest right; and rounding is to the right."""
+    wide = Enclosures(np.array([-3.0 + 1.0j, -1.0, -3.0 - 1.0j]), np.array([2.5, 0.25, 2.5]))
+    assert -0.5 < wide.abscissa < -0.5 + 1e-15
+    assert Enclosures(np.array([-1.0 + 0.0j]), np.array([1.0])).abscissa > 0.0  # not proved to be stable
+    third, tenth = 1.0 / 3.0, 0.1
+    rounded = Enclosures(np.array([-third + 0.0j]), np.array([tenth])).abscissa
+    assert Fraction(rounded) >= Fraction(-third) + Fraction(tenth)
+
+
 @pytest.mark.parametrize("car", [Car(), UNEVEN, Car(b1=8000.0), Car(b1=0.0, b2=0.0)])
 def test_the_cars_eigenvalues_lie_in_their_discs(car: Car) -> None:
     """The discs are proved from the exact parameters; the usual eigenvalues, of a rounded A, are near their centres."""

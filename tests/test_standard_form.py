@@ -26,6 +26,7 @@ from fmu_src.vehicle.linear import linearized
 from fmu_src.vehicle.parameters import Car
 
 DAMPED_TYRES = Car(bp1=150.0, bp2=170.0, Jz=700.0, m11=31.0)
+HARMONICS = (0.01, 0.0, -0.004, 0.0, 0.002, 0.0, 0.0, 0.001)  # m; by default a Fourier road is flat
 
 
 def duffing(x: Sequence[Any], w: Sequence[Any], sine: Any, cosine: Any) -> Sequence[Any]:
@@ -141,9 +142,8 @@ def test_textbook_systems_come_through_the_same_code() -> None:
 @pytest.mark.parametrize("profile", ["bump", "sine", "fourier", "step", "flat"])
 @pytest.mark.parametrize("begin", [0.0, 0.03, 0.1])
 def test_a_road_as_a_signal_is_the_road(profile: str, begin: float) -> None:
-    amplitudes = (0.01, 0.0, -0.004, 0.0, 0.002, 0.0, 0.0, 0.001)
     parameters = RoadParameters(
-        profile=profile, amplitudes=amplitudes, tau0=0.013, t_start=0.05, excited=(True, True, False, True)
+        profile=profile, amplitudes=HARMONICS, tau0=0.013, t_start=0.05, excited=(True, True, False, True)
     )
     exact, times = road(parameters), np.linspace(begin, 2.0, 977)
     expected = np.array([exact.heights(t) + exact.rates(t) for t in times.tolist()]).T
@@ -169,11 +169,13 @@ def integrated(form: StandardForm, x0: Any, w: Any, edges: Sequence[float], time
 @pytest.mark.parametrize("profile", ["bump", "sine", "fourier", "step"])
 def test_the_closed_form_is_what_an_integration_gives(profile: str) -> None:
     form = car_form(DAMPED_TYRES)
-    w = road_signal(RoadParameters(profile=profile, tau0=0.013))
+    w = road_signal(RoadParameters(profile=profile, amplitudes=HARMONICS, tau0=0.013))
     x0, times = np.linspace(-0.01, 0.01, 14), np.linspace(0.0, 0.8, 161)
     expected = integrated(form, x0, w, w.edges, times)
     found = linear_response(form.A, form.B, x0, w, times)
     np.testing.assert_allclose(found, expected, atol=1e-9 * np.abs(expected).max())
+    free = linear_response(form.A, form.B, x0, constant([0.0] * 8), times)
+    assert np.abs(found - free).max() > 0.1 * np.abs(found).max()  # the road is seen, not only the start
 
 
 def test_any_time_alone_and_in_any_order() -> None:
@@ -207,10 +209,11 @@ def test_resonance_and_defective_matrices_are_no_exception() -> None:
 @pytest.mark.parametrize("profile", ["sine", "fourier"])
 def test_the_periodic_motion_is_where_the_response_settles_and_returns_to_itself(profile: str) -> None:
     form = car_form(DAMPED_TYRES)
-    parameters = RoadParameters(profile=profile, tau0=0.013)
+    parameters = RoadParameters(profile=profile, amplitudes=HARMONICS, tau0=0.013)
     w, period = road_signal(parameters), 2.0 * math.pi / parameters.omega
     t = np.array([15.0, 15.02, 15.02 + period])
     forever = periodic_response(form.A, form.B, w.pieces[-1], t)
+    assert np.abs(forever[:7]).max() > 1e-3  # m or rad, on a road of 10 mm
     settled = linear_response(form.A, form.B, np.zeros(14), w, t)
     np.testing.assert_allclose(settled, forever, atol=1e-10 * np.abs(forever).max())
     np.testing.assert_allclose(forever[:, 1], forever[:, 2], atol=1e-13 * np.abs(forever).max())

@@ -69,7 +69,7 @@ def _turning_energy_error(to_fixed: sp.Matrix) -> float:
 
 def rows() -> list[Row]:
     """The rest, in the order of the paper."""
-    return [_unused(), _axle_masses(), _gravity(), _form()]
+    return [_unused(), _axle_masses(), _gravity(), form()]
 
 
 def _unused() -> Row:
@@ -133,29 +133,47 @@ def _axle_masses() -> Row:
     )
 
 
+def weights_left(struts: sp.Matrix, wheels: sp.Matrix) -> int:
+    """Equations in which weights and static loads leave a force, once they balance at rest.
+
+    struts, wheels : slopes (7, 2), (7, 4) by q of what the front and the rear struts' loads act on, and of the wheels'
+                     heights, on which the tyres' loads and the unsprung weights act; the axle's own weight acts on z2.
+    """
+    p, d = printed_car, derive()
+    *loads, g = sp.symbols("F_f F_r N_fl N_fr N_rl N_rr g", real=True)
+    body, axle = (sp.Matrix([int(x == at) for x in d.q]) for at in (p.z, p.z2))
+    weight = p.m * body + wheels * sp.Matrix([p.m11, p.m12, p.m21, p.m22]) + p.m2 * axle
+    forces = g * weight - struts * sp.Matrix(loads[:2]) - wheels * sp.Matrix(loads[2:])
+    at_rest = forces.xreplace(dict.fromkeys(d.q, sp.S.Zero))
+    balance = sp.solve(list(at_rest), loads, dict=True)[0]
+    return sum(sp.simplify(force.subs(balance)) != 0 for force in forces)
+
+
+def slopes_in_print() -> tuple[sp.Matrix, sp.Matrix]:
+    """The slopes for `weights_left` as the print has them: factors of its springs' forces on wheels and road."""
+    p, E = printed_car, printed_car.EQUATIONS
+    front = -sum((E.diff(p.c1, z) for z in (p.z11, p.z12)), sp.zeros(7, 1))
+    struts = sp.Matrix.hstack(front, -E.diff(p.c2, p.z2))
+    wheels = [-E.diff(cp, h) for cp, h in ((p.cp1, p.h11), (p.cp1, p.h12), (p.cp2, p.h21), (p.cp2, p.h22))]
+    return struts, sp.Matrix.hstack(*wheels)
+
+
 def _gravity() -> Row:
     """Weights and the struts' and tyres' static loads cancel in all seven equations at any deflection."""
     p, d = printed_car, derive()
-    loads = sp.symbols("F_f F_r N_fl N_fr N_rl N_rr g", real=True)
-    F_f, F_r, N_fl, N_fr, N_rl, N_rr, g = loads
-    wheels = sp.Matrix([p.z11, p.z12, p.z2 + p.s2 * sp.sin(p.ψ2), p.z2 - p.s2 * sp.sin(p.ψ2)])
-    weight = p.m * p.z + p.m11 * p.z11 + p.m12 * p.z12 + p.m21 * wheels[2] + p.m22 * wheels[3] + p.m2 * p.z2
-    potential = (
-        g * weight - sp.Matrix([F_f, F_f, F_r, F_r]).dot(d.struts) - sp.Matrix([N_fl, N_fr, N_rl, N_rr]).dot(wheels)
-    )
-    forces = sp.Matrix([potential.diff(x) for x in d.q])
-    at_rest = forces.xreplace(dict.fromkeys(d.q, sp.S.Zero))
-    balance = sp.solve(list(at_rest), [F_f, F_r, N_fl, N_fr, N_rl, N_rr], dict=True)[0]
-    left = float(sum(sp.simplify(force.subs(balance)) != 0 for force in forces))
+    heights = sp.Matrix([p.z11, p.z12, p.z2 + p.s2 * sp.sin(p.ψ2), p.z2 - p.s2 * sp.sin(p.ψ2)])
+    front_left, front_right, rear_left, rear_right = d.struts
+    loaded = sp.Matrix([front_left + front_right, rear_left + rear_right])
     return Row(
         equation="(3.1)–(3.7)",
         printed="no gravity, no static load",
         derived="the same: from static equilibrium they cancel for any deflection and any m11, m12, m21, m22",
         evidence=[
             Evidence(
-                measure="equations in which gravity and static loads leave a force, which the print would lack",
-                printed=left,
-                derived=left,
+                measure="equations in which gravity and static loads would leave a force, by the slopes that springs "
+                "and tyres have in the print, and by the geometry",
+                printed=float(weights_left(*slopes_in_print())),
+                derived=float(weights_left(loaded.jacobian(d.q).T, heights.jacobian(d.q).T)),
                 unit="1",
                 tolerance=0.0,
                 apart=1.0,
@@ -165,7 +183,7 @@ def _gravity() -> Row:
     )
 
 
-def _form() -> Row:
+def form() -> Row:
     """(3.8): linear in q̈, of second degree in q̇ where inertia is, of first where dampers are, linear in h."""
 
     def left(equations: sp.Matrix) -> float:

@@ -13,12 +13,12 @@ from ..derivation import derive
 from . import assumptions, printed_car
 from .differences import CONVENTION, Difference, differences, plain
 from .rows import RIGHT, Evidence, Row
-from .system import Array, System, derived, energy, planted, power_residual, printed
+from .system import SAMPLING, Array, System, derived, energy, planted, power_residual, printed
 
-SAMPLE = 200
+SAMPLE, SEED = 4000, 2026  # so many that the seed does not count
 ROUND_OFF = 1e-12
 BUMPS = PARAMETERS["A"].start * np.array([1.0, 2.0, 4.0])  # m
-CROSSING = np.linspace(0.0, 0.6, 121)  # s, holds the peaks of the wheels
+CROSSING = np.linspace(0.0, 0.6, round(0.6 / SAMPLING) + 1)  # s, holds the peaks of all states
 
 
 def rows() -> list[Row]:
@@ -48,9 +48,9 @@ def _misprint(difference: Difference) -> Row:
 
 # ------------------------------------------------------------------ one misprint, all laws
 @cache
-def sample() -> tuple[Array, Array, Array, Array]:
+def sample(seed: int = SEED) -> tuple[Array, Array, Array, Array]:
     """q (7), q̇ (7), h (4), ḣ (4) in SAMPLE columns; angles of about 0.3 rad, heights of 0.1 m."""
-    rng = np.random.default_rng(2026)
+    rng = np.random.default_rng(seed)
     q, v = (
         rng.normal(size=(7, SAMPLE)) * np.array([[0.1, 0.3, 0.3, 0.1, 0.1, 0.1, 0.3]]).T,
         rng.normal(size=(7, SAMPLE)),
@@ -58,8 +58,10 @@ def sample() -> tuple[Array, Array, Array, Array]:
     return q, v, 0.1 * rng.normal(size=(4, SAMPLE)), rng.normal(size=(4, SAMPLE))
 
 
-def power_from_nowhere(system: System) -> float:
-    return float(np.abs(power_residual(system, *sample())).max())
+def power_from_nowhere(system: System, seed: int = SEED) -> float:
+    """Sum of all powers that come from nowhere, over that of road and dampers: one motion of the sample is no more."""
+    residual, turnover = power_residual(system, *sample(seed))
+    return float(np.abs(residual).sum() / turnover.sum())
 
 
 def damping_asymmetry(system: System) -> float:
@@ -79,11 +81,11 @@ def stiffness_asymmetry(system: System) -> float:
     return float(np.abs(K - K.T).max() / np.abs(K).max())
 
 
-def evenness(system: System) -> float:
-    """Even part of the accelerations, over their size, largest over coordinates and the sample."""
-    q, v, h, _ = sample()
+def evenness(system: System, seed: int = SEED) -> float:
+    """Even part of the accelerations over the odd one, each summed over the sample, largest over coordinates."""
+    q, v, h, _ = sample(seed)
     there, back = system.accelerations(q, v, h), system.accelerations(-q, -v, -h)
-    return float((np.abs(there + back).max(axis=1) / np.abs(there - back).max(axis=1)).max())
+    return float((np.abs(there + back).sum(axis=1) / np.abs(there - back).sum(axis=1)).max())
 
 
 def force_on_tilted_road(system: System) -> float:
@@ -101,10 +103,15 @@ def undefined_symbols(system: System) -> float:
     return float(len(system.equations.free_symbols - known))
 
 
-EVENNESS = "even part of the accelerations of an odd system, over their size"
+EVENNESS = "even part of the accelerations, summed over motions drawn at random, over the odd one, of an odd system"
 LAWS: dict[str, tuple[Callable[[System], float], str, float, float]] = {
     "symbols that the nomenclature does not have": (undefined_symbols, "1", 0.0, 1.0),
-    "power from nowhere, over that of road and dampers": (power_from_nowhere, "1", ROUND_OFF, 1e-3),
+    "power from nowhere, summed over motions drawn at random, over that of road and dampers": (
+        power_from_nowhere,
+        "1",
+        ROUND_OFF,
+        1e-4,
+    ),
     "damping matrix, largest |D − Dᵀ| over largest |D|": (damping_asymmetry, "1", ROUND_OFF, 1e-2),
     "least eigenvalue of the damping's symmetric part by mass": (creating_rate, "1/s", ROUND_OFF, 1e-2),
     "stiffness matrix, largest |K − Kᵀ| over largest |K|": (stiffness_asymmetry, "1", ROUND_OFF, 1e-2),

@@ -14,7 +14,7 @@ from tqdm import tqdm
 
 from ..figures import BLUE, DASHED, READING, RED, Axes, Subject, axis_label, finish, readable, render, words
 from ..files import write_whole
-from . import averaging, car, resonance, response, section2, section3, section4
+from . import amplitude_equation, averaging, car, resonance, response, section2, section3, section4, senses
 from .differences import CONVENTION, differences
 from .response import Deviation
 from .rows import Evidence, Row
@@ -45,7 +45,8 @@ class Audit:
 def audit(progress: bool = False) -> Audit:
     """Everything computed anew; takes most of a minute."""
     sections: list[Callable[[], list[Row]]] = [
-        section2.rows, car.rows, section3.rows, averaging.rows, resonance.rows, response.rows, section4.rows
+        section2.rows, car.rows, section3.rows, averaging.rows, amplitude_equation.rows, resonance.rows,
+        section3.road_rows, response.rows, section4.rows, senses.rows,
     ]  # fmt: skip
     runs = [partial(response.remainder, *run) for run in response.runs()]  # kept by their cache
     todo: list[Callable[[], Any]] = [*runs, car.in_convention_a, *sections]
@@ -83,12 +84,15 @@ def as_json(result: Audit) -> dict[str, Any]:
 
 # ------------------------------------------------------------------ words
 NOISE = 1e-5  # numbers that are only known to be below a tolerance as small as this are written so
+ROUND_OFF = 1e-12
 
 
 def shown(e: Evidence, value: float) -> str:
-    """A number to three digits, a count in full; round-off, as below its tolerance."""
+    """A number to three digits, a count in full; round-off, as below its tolerance, or below ROUND_OFF."""
     if e.expected == 0.0 and abs(value) <= e.tolerance and 0.0 < e.tolerance < NOISE:
         return f"< {e.tolerance:g}".replace("-", "−")
+    if 0.0 < abs(value) < ROUND_OFF:
+        return f"< {ROUND_OFF:g}".replace("-", "−")
     return readable(value, 6 if value.is_integer() else 3)
 
 
@@ -146,8 +150,11 @@ HEAD = f"""# The paper audited
 Written by `{COMMAND}`; a test compares every row with what the command gives. The changes to the
 seven equations were found by symbolic difference from the Lagrangian of the car. Under “evidence” stand the numbers
 that decide, each for the printed and for the derived form; of a claim that is refuted, for the printed and for the
-derived system. Lengths in m, angles in rad, SI units throughout; the car is the default one, which is representative
-of its class and not the paper's.
+derived system; of what is right if read so, for the nearest reading and for that one. A condition or sentence “does not
+hold” where a formula would be a misprint. What is decided “by inspection” contradicts itself or what stands beside it,
+and has no number. Without rows: (3.9)–(3.12), which define, and (2.8), (2.9), (2.11), (3.19), which assume. Lengths in
+m, angles in rad, SI units throughout; the car is the default one, which is representative of its class and not the
+paper's.
 """
 
 
@@ -167,7 +174,8 @@ def markdown(result: Audit) -> str:
         "Default car and bump (10 mm); the undefined m_z of (3.4) taken as m2; ψ2 of the print in the sense in which "
         "its road term drives it.",
         _table(*_split(_response_table(result))),
-        "The command draws beside this page:\n\n" + figures,
+        "The command also draws these, into the folder that it is given; the repository holds this page alone:\n\n"
+        + figures,
     ]
     return "\n\n".join(parts) + "\n"
 
@@ -218,6 +226,7 @@ def subjects() -> list[Subject]:
     ]
 
 
+DRAWN = 8  # of the response's rows each eighth, 2 ms apart
 LINES = (("derived", BLUE, "-", "from the energies"), ("printed", RED, DASHED, "as printed"))
 
 
@@ -225,8 +234,8 @@ def _both(k: int, ax: Axes) -> Axes:
     q = response.POSITIONS[k]
     unit, factor = READING[q.unit]
     for name, color, dashes, how in LINES:
-        values = factor * response.responses()[name][:, k]
-        ax.plot(response.TIMES, values, color=color, linestyle=dashes, label=f"{words(q)}, {how}")
+        values = factor * response.responses()[name][::DRAWN, k]
+        ax.plot(response.TIMES[::DRAWN], values, color=color, linestyle=dashes, label=f"{words(q)}, {how}")
     ax.set_ylabel(axis_label((q,), unit))
     return finish(ax)
 
@@ -234,8 +243,7 @@ def _both(k: int, ax: Axes) -> Axes:
 def _decay(ax: Axes) -> Axes:
     for name, color, dashes, how in LINES:
         size = np.abs(response.responses()[name])
-        ax.semilogy(
-            response.TIMES[1:], (size / size.max(axis=0)).max(axis=1)[1:], color=color, linestyle=dashes, label=how
-        )
+        largest = (size / size.max(axis=0)).max(axis=1)
+        ax.semilogy(response.TIMES[DRAWN::DRAWN], largest[DRAWN::DRAWN], color=color, linestyle=dashes, label=how)
     ax.set_ylabel("largest $|q_i|$ over its peak")
     return finish(ax)

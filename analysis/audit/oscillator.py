@@ -16,6 +16,7 @@ from ..methods.polynomials import Array
 OMEGA, P = 2.0, 0.7  # forcing frequency; x_lin = P sin Ωt, so F = P (1 − Ω²)
 ONE_PERIOD = np.linspace(0.0, 2.0 * np.pi, 512, endpoint=False)  # a mean over these is exact for trigonometric sums
 START = np.array([1.0, 0.2])  # ζ at the start
+EPSILONS = np.array([0.04, 0.02, 0.01])
 Force = Callable[[Array, Array], Array]
 
 
@@ -59,9 +60,14 @@ def mean(force: Force, v: Array) -> Array:
     return np.mean(pulled_back(force)(ONE_PERIOD, np.broadcast_to(v, (len(ONE_PERIOD), 2))), axis=0)
 
 
-def flow(rate: Callable[[float, Array], Array], end: float) -> Array:
-    """v(end) (2) from START."""
-    return np.asarray(solve_ivp(rate, (0.0, end), START, method="DOP853", rtol=1e-8, atol=1e-10).y[:, -1])
+def flow(rate: Callable[[float, Array], Array], end: float, start: Array = START) -> Array:
+    """v(end) (2) from `start`."""
+    return np.asarray(solve_ivp(rate, (0.0, end), start, method="DOP853", rtol=1e-9, atol=1e-11).y[:, -1])
+
+
+def order(error: Callable[[float], float]) -> float:
+    """Slope of log error over log ε."""
+    return float(np.polyfit(np.log(EPSILONS), np.log([error(e) for e in EPSILONS]), 1)[0])
 
 
 def w(force: Force, S_1: Force, v: Array, T: float) -> Array:

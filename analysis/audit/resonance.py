@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from itertools import product
 
 from .averaging import A_corrected, missed, pair_sum, still, textbook
-from .rows import Evidence, Row
+from .rows import FAILS, Evidence, Row
 
 Cases = Sequence[tuple[Sequence[int], int]]  # β, Ω (0: flat road)
 Criterion = Callable[[Sequence[int], int], bool]
@@ -65,6 +65,7 @@ def rows() -> list[Row]:
             equation=equation,
             printed=text,
             derived=better,
+            kind=FAILS,
             evidence=[
                 Evidence(
                     measure=f"wrong verdicts on {len(cases)} systems, whether (3.20) misses a part of the mean",

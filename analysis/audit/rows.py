@@ -6,10 +6,14 @@ from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
-MISPRINT, RIGHT, REFUTED = "misprint", "right as printed", "claim refuted"
-"""Kinds of rows. A misprint fails where the derived form passes; what is right passes as the derived form does; a
-claim is refuted by a test that both the printed and the derived system pass."""
+MISPRINT, FAILS, READING = "misprint", "does not hold", "right, if read so"
+RIGHT, REFUTED, INSPECTION = "right as printed", "claim refuted", "by inspection"
+"""Kinds of rows. A misprint is a formula that fails where the derived form passes; so does a sentence or condition that
+does not hold; and so does the nearest reading of what is right if read otherwise, which is no misprint. What is right
+passes as the derived form does; a claim is refuted by a test that both the printed and the derived system pass. By
+inspection: the words contradict themselves or what stands beside them; such a row has no number and claims none."""
 
+FAILING = (MISPRINT, FAILS, READING)
 UNDECIDED = "NOT DECIDED"
 
 
@@ -32,7 +36,7 @@ class Evidence:
     def decides(self, kind: str) -> bool:
         """Whether the derived form passes, and the printed one fails or passes as the kind has it; nan never does."""
         off = abs(self.printed - self.expected)
-        as_claimed = off >= self.apart if kind == MISPRINT else off <= self.tolerance
+        as_claimed = off >= self.apart if kind in FAILING else off <= self.tolerance
         return self.apart >= self.tolerance and abs(self.derived - self.expected) <= self.tolerance and as_claimed
 
 
@@ -43,13 +47,15 @@ class Row:
     equation: str
     printed: str
     derived: str
-    evidence: Sequence[Evidence]
+    evidence: Sequence[Evidence] = ()
     kind: str = MISPRINT
     note: str = ""
 
     @property
     def holds(self) -> bool:
-        """Whether there is evidence and every number of it decides as the row claims."""
+        """Whether there is evidence and every number of it decides as the row claims; by inspection there is none."""
+        if self.kind == INSPECTION:
+            return not self.evidence
         return bool(self.evidence) and all(e.decides(self.kind) for e in self.evidence)
 
     @property

@@ -21,6 +21,7 @@ from . import printed_car
 from .differences import SIGNS, Difference, derived_equations
 
 Array = NDArray[np.float64]
+SAMPLING = 2.5e-4  # s between the times at which maxima are looked for; the fastest mode takes 75 ms, so 1e-4 is missed
 SMALL = dict.fromkeys([*derive().q, *derive().v, *derive().a, *derive().h], sp.S.Zero)
 
 
@@ -149,12 +150,12 @@ def _power_balance() -> Any:
     return sp.lambdify([*d.parameters, *d.q, *d.v, *d.a, *d.h, *d.dh], [rate, road_power, dissipation], cse=True)
 
 
-def power_residual(system: System, q: Array, v: Array, h: Array, dh: Array) -> Array:
-    """Power that comes from nowhere, dE/dt − road + dissipation, over |road| + dissipation, in each column."""
+def power_residual(system: System, q: Array, v: Array, h: Array, dh: Array) -> tuple[Array, Array]:
+    """Power that comes from nowhere, dE/dt − road + dissipation, and |road| + dissipation [W], in each column."""
     s = system.sign[:, None]
     a = system.accelerations(q, v, h)
     rate, road_power, lost = _power_balance()(*_numbers(system.car), *(s * q), *(s * v), *(s * a), *h, *dh)
-    return (rate - road_power + lost) / (np.abs(road_power) + lost)
+    return rate - road_power + lost, np.abs(road_power) + lost
 
 
 @cache
