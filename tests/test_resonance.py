@@ -98,7 +98,7 @@ def test_the_largest_response_to_a_decaying_force_is_found_wherever_it_is() -> N
     rng = np.random.default_rng(1)
     a, b, q = -(10.0 ** rng.uniform(-1, 1, (3, 60)))
     a[:10], q[10:20], b[20:30] = 0.0, 0.0, a[20:30]
-    found = largest_forced(a + 1j * (q + 5.0), b + 5j)
+    found = largest_forced((a + 1j * (q + 5.0)).astype(complex), (b + 5j).astype(complex))
     t = np.linspace(0.0, 100.0, 400001)
     for i in range(60):
         values = np.abs(np.exp((a[i] + 1j * q[i]) * t) - np.exp(b[i] * t)) / abs(a[i] - b[i] + 1j * q[i])
