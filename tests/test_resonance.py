@@ -105,7 +105,8 @@ def test_the_largest_response_to_a_decaying_force_is_found_wherever_it_is() -> N
         assert found[i] == pytest.approx(values.max(), rel=1e-3)
     lam = np.array([-2.0 + 7j])
     assert largest_forced(lam, lam)[0] == pytest.approx(1.0 / (2.0 * np.e), rel=1e-3)
-    assert largest_forced(lam * (1.0 + 1e-12), lam)[0] == pytest.approx(1.0 / (2.0 * np.e), rel=1e-3)
+    close: Any = lam * (1.0 + 1e-12)
+    assert largest_forced(close, lam)[0] == pytest.approx(1.0 / (2.0 * np.e), rel=1e-3)
     assert np.isinf(largest_forced(np.array([7j]), np.array([7j]))[0])
 
 
