@@ -14,7 +14,7 @@ from scipy.special import ellipk
 from analysis.errors import InputError
 from analysis.methods.amplitudes import equilibria, stability, steady_states
 from analysis.methods.averaging import AmplitudeEquations, average
-from analysis.methods.floquet import period_of
+from analysis.methods.floquet import floquet, period_of
 from analysis.methods.nonlinear_response import nonlinear_response
 from analysis.methods.signals import Piece, Signal, harmonic
 from analysis.methods.standard_form import StandardForm, standard_form
@@ -126,6 +126,31 @@ def test_mathieus_principal_resonance() -> None:
 
     slope, bend = observed_order(error, [0.4, 0.2, 0.1])
     assert slope == pytest.approx(3.0, abs=0.1) and bend < 0.05  # measured: 2.99; even powers of ε do not occur
+
+
+def test_the_input_at_which_the_condition_is_lost_is_that_at_which_floquet_exponents_cross_zero() -> None:
+    """x'' + 0.02 x' + x = 0.1 w² x', w = κ cos 3t: α = −0.01 + 0.025 κ²."""
+    form = oscillator(lambda x, v, w: -0.02 * v + 0.1 * w[0] * w[0] * v, 1)
+    found = stability(average(form, harmonic([1.0], 3.0).pieces[0]))
+    assert found.critical_scale.min() == pytest.approx(np.sqrt(0.4), rel=1e-9) and found.critical_scale.min() < 0.8
+    assert found.valid_scale > found.critical_scale.min() and found.lost == "lost at 0.632 times this input"
+    exact = brentq(lambda k: floquet(form, harmonic([k], 3.0).pieces[0]).exponents.real.max(), 0.5, 0.8, xtol=1e-6)
+    assert found.critical_scale.min() == pytest.approx(exact, rel=1e-3)
+
+
+def test_in_a_parametric_resonance_the_condition_counts_what_couples_an_amplitude_to_its_conjugate() -> None:
+    """x'' + 0.02 x' + (1 + ε cos 2t) x = 0 grows like exp((ε/4 − 0.01) t): lost at ε = 0.04; beyond, not decided."""
+
+    def of(eps: float) -> AmplitudeEquations:
+        form = oscillator(lambda x, v, w: -0.02 * v - x * w[0], 1)
+        return average(form, harmonic([eps], 2.0).pieces[0], detuning=0.005)
+
+    found = stability(of(0.02))
+    np.testing.assert_allclose(found.growth, -0.005, rtol=1e-3)
+    np.testing.assert_allclose(found.critical_scale, 2.0, rtol=1e-3)
+    assert found.lost == "lost at 2 times this input"
+    with pytest.raises(InputError, match="got s_2 in s_1', s_1 in s_2'"):
+        stability(of(0.05))
 
 
 # ---------------------------------------------------------------------------------------------------- the remainder
