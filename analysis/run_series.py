@@ -43,7 +43,8 @@ def series_findings(run: Run) -> tuple[list[Finding], str]:
     errors = [_sup((x - approximation) / scale) for approximation in partial_sums(terms)[:ORDERS]]
     sizes = [_sup(term / scale) for term in terms]
     tails = [sum(sizes[k + 2 :]) + sizes[-1] * ratio / (1.0 - ratio) for k in range(ORDERS)]
-    table = f"errors of order 0, 1, …: {', '.join(f'{e:.2g}' for e in errors)}; factor between the terms {ratio:.2g}"
+    accuracy = own_error(run)
+    table = f"errors of order 0, 1, …: {', '.join(f'{e:.2g}' for e in errors)}; {_radius(ratio)}"
     return [
         Finding(
             claim=f"the series to order {k} leaves of the run what its next term says: largest difference, over each "
@@ -51,9 +52,10 @@ def series_findings(run: Run) -> tuple[list[Finding], str]:
             equation="(3.15)–(3.16)",
             measured=errors[k],
             expected=sizes[k + 1],
-            tolerance=tails[k] + own_error(run),
+            tolerance=tails[k] + accuracy,
             unit="1",
-            source=f"trajectory.csv, all states, to {t[-1]:g} s; {table}",
+            source=f"trajectory.csv, all states, to {t[-1]:g} s; {table}"
+            + ("; less than the run's own error may be" if sizes[k + 1] < accuracy else ""),
         )
         for k in range(ORDERS)
     ], ""
@@ -72,6 +74,16 @@ def _terms(run: Run, t: Array, x0: Array) -> tuple[Array, float]:
     found = sampled_series(form, modes(form.A), w, t, x0, ORDERS)
     xi = found.modal(t)
     return (found.modes.K @ xi).real, float(successive_ratios(xi).max()) if xi[0].any() else 0.0
+
+
+def _radius(ratio: float) -> str:
+    """Within which ε, and within which motions, terms get smaller: ε stands for the square of a motion's size."""
+    if ratio == 0.0:
+        return "no terms but the linear one"
+    return (
+        f"factor between the terms {ratio:.2g}, so practical radius ε < {1.0 / ratio:.3g}: motions up to "
+        f"{ratio**-0.5:.3g} times this one"
+    )
 
 
 def _sup(values: Array) -> float:
