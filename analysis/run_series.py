@@ -32,7 +32,7 @@ def series_findings(run: Run) -> tuple[list[Finding], str]:
     t = run.trajectory.time[:MOST_ROWS]
     x = run.trajectory.columns([q.name for q in STATES])[:MOST_ROWS].T
     try:
-        terms, ratio = _terms(run, t, x[:, 0])
+        terms, ratio = series_terms(run, t, x[:, 0], ORDERS)
     except InputError as error:  # no modes
         return [], str(error)
     if not np.abs(terms[0]).any():
@@ -62,16 +62,19 @@ def series_findings(run: Run) -> tuple[list[Finding], str]:
 
 
 @np.errstate(over="ignore", invalid="ignore")  # of motions that are far too large
-def _terms(run: Run, t: Array, x0: Array) -> tuple[Array, float]:
-    """x⁽ᵏ⁾ (ORDERS + 1, 14, len(t)) at the rows' times t from x0, and the largest ratio of successive terms."""
-    form = car_form(car_of(run.parameters), forces=True, order=2 * ORDERS + 1)
+def series_terms(run: Run, t: Array, x0: Array, order: int) -> tuple[Array, float]:
+    """x⁽ᵏ⁾ (order + 1, 14, len(t)) at the rows' times t from x0, and the largest ratio of successive terms.
+
+    Under the exported road and forces. Raises InputError for a car without modes.
+    """
+    form = car_form(car_of(run.parameters), forces=True, order=2 * order + 1)
     road, forces = recorded_road(run.trajectory), run.trajectory.columns([q.name for q in FORCES])
 
     def w(times: Array) -> Array:
         row = np.searchsorted(t, times, side="right") - 1
         return np.concatenate([road(times).T, road(times, 1).T, forces[row].T])
 
-    found = sampled_series(form, modes(form.A), w, t, x0, ORDERS)
+    found = sampled_series(form, modes(form.A), w, t, x0, order)
     xi = found.modal(t)
     return (found.modes.K @ xi).real, float(successive_ratios(xi).max()) if xi[0].any() else 0.0
 

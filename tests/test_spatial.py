@@ -4,15 +4,20 @@ from __future__ import annotations
 
 import csv
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from made_up_run import made_up_run
 from orders import observed_order
 
+from analysis import run_figures
 from analysis.__main__ import main
 from analysis.car import car_form
+from analysis.cosimulation import simulate
+from analysis.discrepancy import linear_states
 from analysis.errors import InputError
 from analysis.methods.linear_response import linear_response
 from analysis.methods.nonlinear_response import nonlinear_response
@@ -20,10 +25,13 @@ from analysis.methods.signals import constant, harmonic
 from analysis.methods.spatial import Transfer, transfer, undamped_modes
 from analysis.methods.standard_form import StandardForm, standard_form
 from analysis.reference import Parameters
+from analysis.run_energies import energies_of
 from analysis.scans import spatial_scan
 from analysis.scans.car_scans import VARIATIONS, higher_road
 from analysis.scans.spatial_scan import Point, car_modes, changed, motions, transfer_of
 from analysis.scenario import read_scenario
+from analysis.trajectory import Run, new_run_folder, write_run
+from fmu_src.quantities import STATES
 from fmu_src.vehicle.parameters import Car
 
 ONE_WHEEL: Parameters = {
@@ -171,3 +179,50 @@ def test_modes_need_symmetric_matrices_and_mass() -> None:
         undamped_modes(np.diag([1.0, 0.0]), np.eye(2))
     with pytest.raises(InputError, match="stiffness >= 0"):
         undamped_modes(np.eye(2), np.diag([1.0, -1.0]))
+
+
+@pytest.fixture(scope="module")
+def run() -> Run:
+    """Of the bump, ten times as high, so that what Φ does is more than the run's error."""
+    scenario = read_scenario("bump")
+    return simulate(replace(scenario, stop_time=1.0, parameters={**scenario.parameters, "A": 0.1}))
+
+
+@pytest.mark.usefixtures("dist")
+def test_energies_along_a_run_are_those_of_its_rows_and_order_1_has_what_phi_changes(run: Run) -> None:
+    found = energies_of(run)
+    x, x_lin = run.trajectory.columns([q.name for q in STATES]).T, linear_states(run).T
+    M, C = found.modes.M, -found.modes.M @ car_form(Car(), order=1).A[7:, :7]
+    whole = 0.5 * (np.einsum("it,ij,jt->t", x[7:], M, x[7:]) + np.einsum("it,ij,jt->t", x[:7], C, x[:7]))
+    np.testing.assert_allclose(found.energies("run").sum(axis=0), whole, rtol=1e-9, atol=1e-9 * whole.max())
+    energies = found.energies("order 0")
+    np.testing.assert_allclose(energies, found.modes.energies(x_lin), atol=1e-6 * energies.max())
+    change, first = found.transfer("run").change, found.transfer("order 1").change
+    assert np.abs(change).max() > 1e-4
+    np.testing.assert_allclose(first, change, atol=0.02 * np.abs(change).max())
+
+
+@pytest.mark.usefixtures("dist")
+def test_spatial_on_a_run_writes_table_and_figure_which_the_report_takes(
+    run: Run, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with new_run_folder(tmp_path / "run") as folder:
+        write_run(run, folder)
+    assert main(["spatial", str(tmp_path / "run")]) == 0
+    said = capsys.readouterr().out
+    found = energies_of(run)
+    assert f"largest gain of one mode {found.transfer('run').largest_gain:.3g} of the linear energy" in said
+    table = list(csv.DictReader((tmp_path / "run" / "modal-energies.csv").read_text().splitlines()))
+    assert len(table) == len(run.trajectory.time) and len(table[0]) == 1 + 3 * 7
+    assert float(table[300]["E_2 order 1 [J]"]) == found.energies("order 1")[1, 300]
+    (entry,) = run_figures.energies(tmp_path / "run")
+    assert entry.title == "Energy of the modes" and "of order 0 (linear) and 1" in entry.caption
+    assert main(["report", str(tmp_path / "run")]) == 0
+    assert entry.title in (tmp_path / "run" / "report.html").read_text()
+
+
+def test_a_run_that_stands_still_has_no_energies_to_tell() -> None:
+    still = made_up_run()
+    still.trajectory.values[:] = 0.0
+    with pytest.raises(InputError, match="stands still"):
+        energies_of(still)

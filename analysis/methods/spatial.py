@@ -74,7 +74,7 @@ class Transfer:
         0 if all modes gain or all lose, as where Φ lets a mode take more from the road; it cannot exceed 1.
         """
         change = self.change
-        return float(min(change[change > 0.0].sum(), -change[change < 0.0].sum()))
+        return float(min(change[change > 0.0].sum(), abs(change[change < 0.0].sum())))
 
     @property
     def largest_gain(self) -> float:
