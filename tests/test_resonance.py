@@ -226,16 +226,38 @@ def test_a_scan_finds_the_speed_at_which_the_road_meets_a_mode() -> None:
     np.testing.assert_allclose(curve, np.abs(result.frequencies[:, 3] - result.road))
 
 
+@pytest.mark.parametrize("points", [4, 9])
+def test_a_scan_says_where_frequencies_meet_whatever_its_points_and_ranks_what_it_detunes(points: int) -> None:
+    result = scan({"profile": "sine", "v0": 11.0}, "speed", points=points)
+    beta = modes(car_form(Car(), order=1).A).beta
+    met = {str(crossing.row): crossing.value for crossing in resonance_scan.crossings(result)}
+    assert met["β7 = Ω"] == pytest.approx(beta[6] / (2.0 * np.pi), rel=1e-9)
+    assert met["β4 = Ω"] == pytest.approx(beta[3] / (2.0 * np.pi), rel=1e-9)
+    assert str(resonance_scan.crossings(result)[0].row) == "β7 = Ω"
+    assert all(road for _, road in result.changing)
+    assert all(row.road for attribute in ("relative", "relative_distance") for row in result.nearest(attribute))
+    said = "\n".join(resonance_scan.scan_lines(result))
+    assert "β7 = Ω at 12.75, gain" in said and "β5 = β6" not in said
+    assert "nearest is nearest in frequency" not in said and said.count("nearest is nearest with damping") == 1
+
+
 def test_the_command_prints_and_writes(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(resonance_scan, "POINTS", 5)
     assert main(["resonances", "bump", "-o", str(tmp_path)]) == 0
     assert "no lasting waves" in capsys.readouterr().out
-    rows = list(csv.reader((tmp_path / "resonances.csv").read_text().splitlines()))
-    assert rows[0][0] == "equality" and len(rows) > 500
+    rows = list(csv.DictReader((tmp_path / "resonances.csv").read_text().splitlines()))
+    assert "equality" in rows[0] and len(rows) > 500
+    first = rows[0]
+    assert float(first["relative detuning"]) == float(first["detuning [rad/s]"]) / float(first["scale [rad/s]"])
+    assert float(first["relative distance"]) == float(first["distance [1/s]"]) / float(first["scale [rad/s]"])
+    (tmp_path / "resonances.csv").unlink()
     assert main(["resonances", "sine", "--scan", "c2/c1", "-o", str(tmp_path)]) == 0
-    assert "nearest in frequency" in capsys.readouterr().out
+    said = capsys.readouterr().out
+    assert "the passive car, actuators at rest" in said and "frequencies meet exactly, the strongest: " in said
+    assert "λ_7 = λ_7 + σ_1 + σ_2: grows like t exp(λ_7 t)" in said
+    assert (tmp_path / "resonances.csv").is_file()
     assert ElementTree.parse(tmp_path / "resonances-c2-c1.svg").getroot().tag.endswith("svg")
     assert len((tmp_path / "resonances-c2-c1.csv").read_text().splitlines()) == 6
     assert main(["resonances", "sine", "--scan", "colour"]) == 2
