@@ -12,7 +12,7 @@ from scipy.optimize import brentq
 from scipy.special import ellipk
 
 from analysis.errors import InputError
-from analysis.methods.amplitudes import equilibria, stability, steady_states
+from analysis.methods.amplitudes import equilibria, left_out, stability, steady_states
 from analysis.methods.averaging import AmplitudeEquations, average
 from analysis.methods.floquet import floquet, period_of
 from analysis.methods.nonlinear_response import nonlinear_response
@@ -151,6 +151,15 @@ def test_in_a_parametric_resonance_the_condition_counts_what_couples_an_amplitud
     assert found.lost == "lost at 2 times this input"
     with pytest.raises(InputError, match="got s_2 in s_1', s_1 in s_2'"):
         stability(of(0.05))
+
+
+def test_up_to_which_amplitude_averaging_describes_is_told_from_what_it_takes_out() -> None:
+    """Duffing: W has u³, u u*², u*³ with sizes ε (1/4 + 3/4 + 1/8) |s|³, a tenth of |s| at |s|² = 0.1/(1.125 ε)."""
+    equations = average(duffing(0.2))
+    reach = stability(equations).valid_amplitudes
+    np.testing.assert_allclose(reach, np.sqrt(0.1 / 1.125 / 0.2), rtol=1e-9)
+    assert left_out(equations, reach.astype(complex)) == pytest.approx(0.1 * reach[0], rel=1e-9)
+    assert stability(average(van_der_pol(0.01))).valid_amplitudes[0] > 1.0
 
 
 # ---------------------------------------------------------------------------------------------------- the remainder
