@@ -25,6 +25,7 @@ from .reference import car_of, road_parameters
 from .trajectory import Run
 
 FEWEST = 10  # rows after the road's last edge
+MOST_ROWS, BLOCK = 20_000, 200  # that are compared, from the first of them; that are held at a time
 UNDAMPED = 1e-12  # of |λ|: decay rates as small as this are round-off
 DEGREE = 3  # of Φ: what a relative error of its arguments is multiplied with
 
@@ -113,14 +114,15 @@ def stretch_of(moved: Moved) -> Stretch:
     if len(t) < FEWEST:
         raise InputError(f"the road changes its form until {begin:g} s, and {len(t)} rows come after that")
     equations = average(moved.form, moved.piece, found=moved.modes, detuning=slow(moved.modes))
-    x = moved.x[:, -len(t) :]
+    t, x = t[:MOST_ROWS], moved.x[:, -len(t) :][:, :MOST_ROWS]
     first = equations.amplitudes(x[:, 0], t[0])
     out, size = left_out(equations, first), _size(first[:, None], equations)
     if not out <= LEFT_OUT * size:
         raise InputError(
             f"the motion is too large: averaging would leave out up to {out / size:.2g} of it, wanted <= {LEFT_OUT:g}"
         )
-    amplitudes = equations.amplitudes(x, t, exact=True)
+    parts = [slice(i, i + BLOCK) for i in range(0, len(t), BLOCK)]
+    amplitudes = np.concatenate([equations.amplitudes(x[:, p], t[p], exact=True) for p in parts], axis=1)
     return Stretch(t=t, x=x, amplitudes=amplitudes, equations=equations, left_out=out)
 
 

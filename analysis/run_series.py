@@ -21,6 +21,7 @@ from .trajectory import Run
 
 ORDERS = 3  # that are compared with the run; one more term is formed, to know what the last one leaves
 MOST_ROWS = 20_000  # of the run that are compared, from its first
+HIGH_AS_A = ("bump", "sine", "step")  # profiles of which A is the height
 USEFUL = 0.5  # ratio of successive terms from which on a few of them say nothing about the motion
 
 
@@ -44,7 +45,7 @@ def series_findings(run: Run) -> tuple[list[Finding], str]:
     sizes = [_sup(term / scale) for term in terms]
     tails = [sum(sizes[k + 2 :]) + sizes[-1] * ratio / (1.0 - ratio) for k in range(ORDERS)]
     accuracy = own_error(run)
-    table = f"errors of order 0, 1, …: {', '.join(f'{e:.2g}' for e in errors)}; {_radius(ratio)}"
+    table = f"errors of order 0, 1, …: {', '.join(f'{e:.2g}' for e in errors)}; {_radius(ratio, run)}"
     return [
         Finding(
             claim=f"the series to order {k} leaves of the run what its next term says: largest difference, over each "
@@ -79,13 +80,15 @@ def series_terms(run: Run, t: Array, x0: Array, order: int) -> tuple[Array, floa
     return (found.modes.K @ xi).real, float(successive_ratios(xi).max()) if xi[0].any() else 0.0
 
 
-def _radius(ratio: float) -> str:
+def _radius(ratio: float, run: Run) -> str:
     """Within which ε, and within which motions, terms get smaller: ε stands for the square of a motion's size."""
     if ratio == 0.0:
         return "no terms but the linear one"
+    times = ratio**-0.5
+    road = f", A = {times * run.reals('A')[0]:.3g} m" if run.parameters.get("profile") in HIGH_AS_A else ""
     return (
-        f"factor between the terms {ratio:.2g}, so practical radius ε < {1.0 / ratio:.3g}: motions up to "
-        f"{ratio**-0.5:.3g} times this one"
+        f"factor between the terms {ratio:.2g}, so practical radius ε < {1.0 / ratio:.3g}: motions up to {times:.3g} "
+        f"times this one{road}"
     )
 
 

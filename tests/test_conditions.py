@@ -13,6 +13,7 @@ import pytest
 from flint import fmpq
 from test_almost_stable import OMEGA, PERIOD, build, certified, duffing, quiet
 
+from analysis.bertolino_baksa.balls import NotProvedError
 from analysis.bertolino_baksa.conditions import Verdict, conditions, growth_of
 from analysis.bertolino_baksa.norms import proved_metric
 from analysis.bertolino_baksa.proof import Proof, prove
@@ -129,3 +130,16 @@ def test_the_amplitudes_table_says_where_there_is_none() -> None:
     creeping: Parameters = {"b1": 12000.0, "b2": 12000.0}
     (line,) = amplitude_lines(creeping, None)
     assert "not for this car and road" in line
+
+
+def test_near_a_resonance_averaging_reaches_further_than_its_small_divisors() -> None:
+    """Where the road all but meets mode 7: the term is kept, not divided by the detuning."""
+
+    def unproved() -> Proof:
+        raise NotProvedError("left out here")
+
+    parameters: Parameters = {"profile": "sine", "A": 0.01, "Lambda": 1.0, "v0": 12.75404, "tau0": 0.02}
+    piece = road_signal(road_parameters(parameters)).pieces[-1]
+    C1 = conditions(car_form(Car(), order=3), piece, unproved)[1]
+    height = float(C1.reason.split("not lost up to ")[1].split(" times")[0])
+    assert C1.holds and 5.0 < height < 20.0

@@ -66,6 +66,7 @@ def test_the_practical_radius_is_said_and_what_the_run_is_too_coarse_to_show() -
         return float(epsilon), A * float(rest.split(" times this one")[0])
 
     (small, first), (large, second) = radius(0.01), radius(0.02)
+    assert f", A = {first:.3g} m" in series_findings(simulated(A=0.01))[0][0].source
     assert small / large == pytest.approx(4.0, rel=0.02)
     assert first == pytest.approx(second, rel=0.01) and first == pytest.approx(0.01 * small**0.5, rel=0.01)
     blind = "less than the run's own error may be"
