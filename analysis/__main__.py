@@ -97,8 +97,9 @@ def _parser() -> argparse.ArgumentParser:
     verb = verbs.add_parser(
         "spatial", help="how much energy the nonlinear terms move between the car's modes, and where"
     )
-    verb.add_argument("scenario", nargs="?", default="fourier-fl", help=f"{scenario} (default: fourier-fl)")
-    verb.add_argument("-o", "--out", type=Path, metavar="DIR", help="folder for the table of the scan")
+    energies = "or a run folder: energy of each mode along the run and its series"
+    verb.add_argument("scenario", nargs="?", default="fourier-fl", help=f"{scenario} (default: fourier-fl); {energies}")
+    verb.add_argument("-o", "--out", type=Path, metavar="DIR", help="folder for the table (default for a run: the run)")
     verb.set_defaults(do=_spatial)
 
     verb = verbs.add_parser("stabilize", help="optimal stabilization of section 4 and its robustness; needs no run")
@@ -110,6 +111,11 @@ def _parser() -> argparse.ArgumentParser:
 
 
 def _spatial(options: argparse.Namespace) -> int:
+    _wants_folder(options.out)
+    if (folder := Path(options.scenario)).is_dir():
+        from .run_energies import command as along
+
+        return along(folder, options.out)
     from .scans.spatial_scan import command
 
     return command(options.scenario, options.out)

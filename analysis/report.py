@@ -96,7 +96,8 @@ def write_report(run_folder: Path) -> Path:
     counterpart = others.get(COUNTERPART)
     findings = read_findings(run_folder / FINDINGS)
     certified = run_figures.certified(run_folder)
-    entries = [*run_figures.draw_all(run, counterpart, run_folder, others.get(OTHER_DESIGN)), *certified]
+    drawn = run_figures.draw_all(run, counterpart, run_folder, others.get(OTHER_DESIGN))
+    entries = [*drawn, *run_figures.energies(run_folder), *certified]
     page = _template().render(
         title=run.record["scenario"].get("title") or run.record["scenario"].get("name") or "A run",
         summary=summary(run),

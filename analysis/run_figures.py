@@ -40,6 +40,7 @@ from .tyres import static_loads, tyre_loads
 
 FOLDER = "figures"
 TUBE, DELTA = "certified-tube.svg", "certified-delta.svg"  # drawn by `certify RUN`, with their captions in them
+ENERGIES = "modal-energies.svg"  # by `spatial RUN`, likewise
 Z, PSI, PHI, Z11, Z12, Z2, PSI2 = POSITIONS
 
 
@@ -64,7 +65,16 @@ def draw_all(run: Run, counterpart: Run | None, folder: Path, other_design: Run 
 
 def certified(folder: Path) -> list[FigureEntry]:
     """The figures that `certify RUN` drew into a run's folder, if any. Raises InputError for what it did not draw."""
-    found = [folder / FOLDER / name for name in (TUBE, DELTA)]
+    return _kept(folder, TUBE, DELTA)
+
+
+def energies(folder: Path) -> list[FigureEntry]:
+    """The figure that `spatial RUN` drew into a run's folder, if it did. Raises InputError as `certified` does."""
+    return _kept(folder, ENERGIES)
+
+
+def _kept(folder: Path, *names: str) -> list[FigureEntry]:
+    found = [folder / FOLDER / name for name in names]
     return [FigureEntry(path.name, *described(path.read_bytes(), str(path))) for path in found if path.is_file()]
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -12,9 +13,9 @@ from scipy.optimize import brentq
 from scipy.special import ellipk
 
 from analysis.errors import InputError
-from analysis.methods.amplitudes import equilibria, stability, steady_states
+from analysis.methods.amplitudes import equilibria, left_out, stability, steady_states
 from analysis.methods.averaging import AmplitudeEquations, average
-from analysis.methods.floquet import period_of
+from analysis.methods.floquet import floquet, period_of
 from analysis.methods.nonlinear_response import nonlinear_response
 from analysis.methods.signals import Piece, Signal, harmonic
 from analysis.methods.standard_form import StandardForm, standard_form
@@ -128,6 +129,40 @@ def test_mathieus_principal_resonance() -> None:
     assert slope == pytest.approx(3.0, abs=0.1) and bend < 0.05  # measured: 2.99; even powers of ε do not occur
 
 
+def test_the_input_at_which_the_condition_is_lost_is_that_at_which_floquet_exponents_cross_zero() -> None:
+    """x'' + 0.02 x' + x = 0.1 w² x', w = κ cos 3t: α = −0.01 + 0.025 κ²."""
+    form = oscillator(lambda x, v, w: -0.02 * v + 0.1 * w[0] * w[0] * v, 1)
+    found = stability(average(form, harmonic([1.0], 3.0).pieces[0]))
+    assert found.critical_scale.min() == pytest.approx(np.sqrt(0.4), rel=1e-9) and found.critical_scale.min() < 0.8
+    assert found.valid_scale > found.critical_scale.min() and found.lost == "lost at 0.632 times this input"
+    exact = brentq(lambda k: floquet(form, harmonic([k], 3.0).pieces[0]).exponents.real.max(), 0.5, 0.8, xtol=1e-6)
+    assert found.critical_scale.min() == pytest.approx(exact, rel=1e-3)
+
+
+def test_in_a_parametric_resonance_the_condition_counts_what_couples_an_amplitude_to_its_conjugate() -> None:
+    """x'' + 0.02 x' + (1 + ε cos 2t) x = 0 grows like exp((ε/4 − 0.01) t): lost at ε = 0.04; beyond, not decided."""
+
+    def of(eps: float) -> AmplitudeEquations:
+        form = oscillator(lambda x, v, w: -0.02 * v - x * w[0], 1)
+        return average(form, harmonic([eps], 2.0).pieces[0], detuning=0.005)
+
+    found = stability(of(0.02))
+    np.testing.assert_allclose(found.growth, -0.005, rtol=1e-3)
+    np.testing.assert_allclose(found.critical_scale, 2.0, rtol=1e-3)
+    assert found.lost == "lost at 2 times this input"
+    with pytest.raises(InputError, match="got s_2 in s_1', s_1 in s_2'"):
+        stability(of(0.05))
+
+
+def test_up_to_which_amplitude_averaging_describes_is_told_from_what_it_takes_out() -> None:
+    """Duffing: W has u³, u u*², u*³ with sizes ε (1/4 + 3/4 + 1/8) |s|³, a tenth of |s| at |s|² = 0.1/(1.125 ε)."""
+    equations = average(duffing(0.2))
+    reach = stability(equations).valid_amplitudes
+    np.testing.assert_allclose(reach, np.sqrt(0.1 / 1.125 / 0.2), rtol=1e-9)
+    assert left_out(equations, reach.astype(complex)) == pytest.approx(0.1 * reach[0], rel=1e-9)
+    assert stability(average(van_der_pol(0.01))).valid_amplitudes[0] > 1.0
+
+
 # ---------------------------------------------------------------------------------------------------- the remainder
 @pytest.mark.parametrize(
     ("form_of", "x0", "near"),
@@ -162,6 +197,20 @@ def test_so_is_that_of_mathieus_equation_near_its_principal_resonance(order: int
 
     slope, bend = observed_order(error, EPSILONS)
     assert slope == pytest.approx(order, abs=0.15)
+    assert bend < 0.1
+
+
+def test_in_second_order_a_term_that_was_kept_and_one_that_was_taken_out_can_be_slow_together() -> None:
+    """Two waves a little apart, one within the detuning and one beyond: −DW·N counts; without it the slope is 1."""
+    one, two = harmonic([1.0], 2.499).pieces[0], harmonic([1.0], 2.501).pieces[0]
+    both = Piece(0.0, np.concatenate([one.exponents, two.exponents]), np.hstack([one.amplitudes, two.amplitudes]))
+
+    def error(eps: float) -> float:
+        form = mathieu(eps)
+        return sup_error(form, average(form, both, order=2, detuning=0.5), [1.0, 0.5], 1.0 / eps, Signal((both,)))
+
+    slope, bend = observed_order(error, EPSILONS)
+    assert slope == pytest.approx(2.0, abs=0.15)
     assert bend < 0.1
 
 
@@ -223,40 +272,111 @@ def test_equilibria_refuse_what_they_do_not_cover() -> None:
         equilibria(average(pair(0.1, 3.0), detuning=0.1))
 
 
-@pytest.mark.parametrize("primary", [True, False], ids=["primary", "superharmonic"])
-def test_forced_duffing_against_harmonic_balance_of_a_third_party(primary: bool) -> None:
-    """Amplitude of the steady motion, in primary resonance with weak, and in 3:1 with strong forcing: slope in ε."""
+@dataclass(frozen=True)
+class Steady:
+    """A system, its input, the frequency of its steady motion, and q'' (q, q', w) for harmonic balance."""
+
+    form: StandardForm
+    force: float  # of w = force · cos(Ω t)
+    Omega: float
+    omega: float
+    accelerations: Callable[[Any, Any, Any], list[Any]]
+    modes: int = 1
+
+
+def second_order(accelerations: Callable[[Any, Any, Any], list[Any]], modes: int = 1) -> StandardForm:
+    """Of q'' = accelerations(q, q', w)."""
+    names = [f"q{k}" for k in range(modes)] + [f"v{k}" for k in range(modes)]
+    return standard_form(
+        lambda z, w, s, c: [*z[modes:], *accelerations(z[:modes], z[modes:], w[0])], names, 1, powers={1: 0, 2: 1, 3: 1}
+    )
+
+
+def forced_duffing(eps: float, primary: bool) -> Steady:
+    """In primary resonance with weak, in 3:1 with strong forcing."""
+    omega = 1.0 + eps * 0.5 if primary else (1.0 + eps * 0.4) / 3.0
+
+    def q(x: Any, v: Any, w: Any) -> list[Any]:
+        return [-x[0] - eps * x[0] * x[0] * x[0] - 0.2 * eps * v[0] + w]
+
+    return Steady(second_order(q), eps * 0.3 if primary else 0.6, omega, omega, q)
+
+
+def forced_van_der_pol(eps: float) -> Steady:
+    """Its limit cycle locked to the force."""
+
+    def q(x: Any, v: Any, w: Any) -> list[Any]:
+        return [-x[0] + eps * v[0] - eps * x[0] * x[0] * v[0] + w]
+
+    return Steady(second_order(q), eps, 1.0 + 0.1 * eps, 1.0 + 0.1 * eps, q)
+
+
+def mathieu_with_a_cubic_spring(eps: float) -> Steady:
+    """In the principal resonance: half the frequency of the excitation."""
+
+    def q(x: Any, v: Any, w: Any) -> list[Any]:
+        return [-x[0] - eps * x[0] * w - 0.2 * eps * v[0] - eps * x[0] * x[0] * x[0]]
+
+    return Steady(second_order(q), 1.0, 2.0 + 0.2 * eps, 1.0 + 0.1 * eps, q)
+
+
+def forced_pair(eps: float, ratio: float) -> Steady:
+    """The pair of `pair`, damped, the first oscillator forced near its resonance, the second nearly at ratio : 1."""
+    omega = 1.0 + 0.3 * eps
+
+    def q(z: Any, v: Any, w: Any) -> list[Any]:
+        x, y = z
+        first = -x - 0.4 * eps * v[0] - eps * (x * x * x + x * x * y + x * y * y) + w
+        return [first, y * -((ratio + eps) ** 2) - 0.4 * eps * v[1] - eps * (x * x * x * (1.0 / 3.0) + x * x * y)]
+
+    return Steady(second_order(q, 2), 0.4 * eps, omega, omega, q, 2)
+
+
+STEADY: dict[str, Callable[[float], Steady]] = {
+    "Duffing, primary": lambda eps: forced_duffing(eps, True),
+    "Duffing, superharmonic": lambda eps: forced_duffing(eps, False),
+    "van der Pol, locked": forced_van_der_pol,
+    "Mathieu, subharmonic": mathieu_with_a_cubic_spring,
+    "pair 1:3": lambda eps: forced_pair(eps, 3.0),
+    "pair 1:1": lambda eps: forced_pair(eps, 1.0),
+}
+
+
+@pytest.mark.parametrize("name", STEADY)
+def test_steady_motions_against_harmonic_balance_of_a_third_party(name: str) -> None:
+    """Stable steady motions, of one mode or two locked to the input and each other: slope in ε."""
     import mousai
 
     n = 9
 
     def error(eps: float) -> float:
-        omega = 1.0 + eps * 0.5 if primary else (1.0 + eps * 0.4) / 3.0
-        force = eps * 0.3 if primary else 0.6
-        form, piece = duffing(eps, damping=0.2 * eps, inputs=1), harmonic([force], omega).pieces[0]
-        equations = average(form, piece, detuning=2.0 * eps, order=1)
-        states = steady_states(equations, [np.array([r * np.exp(1j * p)]) for r in (0.1, 0.5) for p in range(6)])
-        stable = [(S, d) for S, growth, d in states if growth.real.max() < 0.0]
-        S, delta = min(stable, key=lambda state: abs(state[0][0]))
-        t = np.linspace(0.0, 2.0 * np.pi / omega, 2 * n + 1, endpoint=False)
-        mine = equations.states(S[:, None] * np.exp(1j * np.multiply.outer(delta, t)), t)[0]
+        case = STEADY[name](eps)
+        equations = average(case.form, harmonic([case.force], case.Omega).pieces[0], detuning=3.0 * eps)
+        rng = np.random.default_rng(5)
+        starts = [rng.uniform(0.1, 1.2, case.modes) * np.exp(2j * np.pi * rng.random(case.modes)) for _ in range(40)]
+        states = steady_states(equations, starts)
+        moving = [(S, d) for S, growth, d in states if growth.real.max() < 0.0 and abs(S[0]) > 0.02]
+        S, delta = min(moving, key=lambda state: abs(state[0][0]))
+        t = np.linspace(0.0, 2.0 * np.pi / case.omega, 2 * n + 1, endpoint=False)
+        mine = equations.states(S[:, None] * np.exp(1j * np.multiply.outer(delta, t)), t)[: case.modes]
+        assert np.abs(mine).max(axis=1).min() > 0.02  # both move
 
         def acceleration(x: Any, v: Any, params: dict[str, float]) -> Any:
-            drive = force * np.cos(params["omega"] * params["cur_time"])
-            return np.array([-x - eps * x**3 - 0.2 * eps * v + drive]).reshape(1, -1)
+            w = case.force * np.cos(case.Omega * params["cur_time"])
+            return np.array(case.accelerations(x.ravel(), v.ravel(), w)).reshape(case.modes, 1)
 
-        _, x, e, *_ = mousai.hb_time(acceleration, mine[None], omega, num_harmonics=n, num_variables=1, f_tol=1e-10)
+        _, x, e, *_ = mousai.hb_time(
+            acceleration, mine, case.omega, num_harmonics=n, num_variables=case.modes, f_tol=1e-10
+        )
         assert np.abs(e).max() < 1e-9
-        return float(np.abs(mine - x[0]).max())
+        return float(np.abs(mine - x).max())
 
     slope, bend = observed_order(error, [0.08, 0.04, 0.02])
     assert slope == pytest.approx(1.0, abs=0.15)
     assert bend < 0.1
 
 
-# ---------------------------------------------------------------------------------------------------- the car
-
-
+# ---------------------------------------------------------------------------------------------------- refusals
 def test_bad_input_is_refused() -> None:
     form = duffing(0.1, inputs=1)
     with pytest.raises(InputError, match="waves that last"):

@@ -13,15 +13,20 @@ import pytest
 from flint import fmpq
 from test_almost_stable import OMEGA, PERIOD, build, certified, duffing, quiet
 
+from analysis.bertolino_baksa.balls import NotProvedError
 from analysis.bertolino_baksa.conditions import Verdict, conditions, growth_of
 from analysis.bertolino_baksa.norms import proved_metric
 from analysis.bertolino_baksa.proof import Proof, prove
-from analysis.car import car_form
+from analysis.car import car_form, road_signal
+from analysis.certificates.car_amplitudes import amplitude_lines, car_amplitudes
 from analysis.certificates.car_conditions import car_verdicts
+from analysis.methods.amplitudes import LEFT_OUT
+from analysis.methods.averaging import average
 from analysis.methods.floquet import floquet
 from analysis.methods.modes import modes
 from analysis.methods.signals import Piece, harmonic
 from analysis.methods.standard_form import standard_form
+from analysis.reference import Parameters, road_parameters
 from analysis.scenario import read_scenario
 from fmu_src.vehicle.parameters import Car
 
@@ -96,3 +101,45 @@ def test_the_verdict_of_record_on_the_bump() -> None:
     C0, C1, C2, C3 = car_verdicts(read_scenario("bump").parameters)
     assert not C0.holds
     assert C1.holds and C2.holds and C3.holds
+
+
+def test_the_amplitudes_table_is_that_of_the_averaged_equations_and_its_second_order_is_nearer_to_floquet() -> None:
+    parameters: Parameters = {"profile": "sine", "A": 0.03, "Lambda": 1.0, "v0": 10.0, "tau0": 0.02}
+    form, piece = car_form(Car()), road_signal(road_parameters(parameters)).pieces[-1]
+    found, exact = car_amplitudes(parameters, piece), floquet(form, piece).exponents[:7]
+    equations = average(form, piece)
+    np.testing.assert_allclose(found.A + found.B, equations.linear[:7], rtol=1e-9)
+    assert np.abs(found.B[[1, 5, 6]].real).min() > 1e-6 * np.abs(found.A).max() and not found.B[3].any()
+    error = [
+        np.abs(equations.modes.eigenvalues[:7] + change - exact).max() for change in (found.A + found.B, found.second)
+    ]
+    assert error[1] < 0.1 * error[0] < 0.01 * np.abs(exact - equations.modes.eigenvalues[:7]).max()
+    assert found.own[1] == equations.coefficient(1, (1, 1, 8))
+    (rest, out), *others = found.resting
+    assert not rest.amplitudes.any() and rest.stable and out < LEFT_OUT and len(others) == 20
+    lines = amplitude_lines(parameters, piece)
+    row = next(line for line in lines if line.startswith("   7")).split()
+    assert [float(row[i]) for i in (1, 2, 3, 5)] == pytest.approx(
+        [equations.modes.alpha[6], found.A[6].real, found.B[6].real, found.second[6].real], rel=0.01
+    )
+    assert row[7].endswith("*") and float(row[7][:-1]) > float(row[8])
+    assert "20 more solve the equations where averaging ends" in lines[-1]
+
+
+def test_the_amplitudes_table_says_where_there_is_none() -> None:
+    creeping: Parameters = {"b1": 12000.0, "b2": 12000.0}
+    (line,) = amplitude_lines(creeping, None)
+    assert "not for this car and road" in line
+
+
+def test_near_a_resonance_averaging_reaches_further_than_its_small_divisors() -> None:
+    """Where the road all but meets mode 7: the term is kept, not divided by the detuning."""
+
+    def unproved() -> Proof:
+        raise NotProvedError("left out here")
+
+    parameters: Parameters = {"profile": "sine", "A": 0.01, "Lambda": 1.0, "v0": 12.75404, "tau0": 0.02}
+    piece = road_signal(road_parameters(parameters)).pieces[-1]
+    C1 = conditions(car_form(Car(), order=3), piece, unproved)[1]
+    height = float(C1.reason.split("not lost up to ")[1].split(" times")[0])
+    assert C1.holds and 5.0 < height < 20.0

@@ -75,7 +75,7 @@ def test_near_resonance_loses_no_more_accuracy_than_is_said(eigenvalue: complex,
 def test_exponents_in_a_rational_ratio_share_a_rate() -> None:
     exponents = np.array([2j, -2j, 3j, 0.0, -0.5 + 1j * np.sqrt(2.0), 6j])
     rates, multiples = common_rates(exponents)
-    assert multiples.tolist() == [[2, 0], [-2, 0], [3, 0], [0, 0], [0, 1], [6, 0]]
+    assert multiples.tolist() == [[2, 0, 0, 0], [0, 1, 0, 0], [3, 0, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1], [6, 0, 0, 0]]
     np.testing.assert_allclose(multiples @ rates, exponents, rtol=1e-15)
 
 

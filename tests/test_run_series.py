@@ -57,6 +57,23 @@ def test_each_order_leaves_what_its_next_term_says(name: str, parameters: dict[s
     assert findings[0].tolerance < 0.5 * findings[0].expected or parameters.get("road_sampling") == "start"
 
 
+def test_the_practical_radius_is_said_and_what_the_run_is_too_coarse_to_show() -> None:
+    """The factor goes with the square of the motion, so the largest motion is the same whichever the run."""
+
+    def radius(A: float) -> tuple[float, float]:
+        source = series_findings(simulated(A=A))[0][0].source
+        epsilon, rest = source.split("practical radius ε < ")[1].split(": motions up to ")
+        return float(epsilon), A * float(rest.split(" times this one")[0])
+
+    (small, first), (large, second) = radius(0.01), radius(0.02)
+    assert f", A = {first:.3g} m" in series_findings(simulated(A=0.01))[0][0].source
+    assert small / large == pytest.approx(4.0, rel=0.02)
+    assert first == pytest.approx(second, rel=0.01) and first == pytest.approx(0.01 * small**0.5, rel=0.01)
+    blind = "less than the run's own error may be"
+    assert [blind in f.source for f in series_findings(simulated(A=0.01))[0]] == [False, True, True]
+    assert [blind in f.source for f in series_findings(simulated(A=0.1))[0]] == [False, False, True]
+
+
 def test_a_motion_of_another_car_is_not_that_of_the_series() -> None:
     run = simulated(A=0.05)
     Jx = run.reals("Jx")[0] * 1.001

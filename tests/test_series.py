@@ -15,7 +15,7 @@ from analysis.car import car_form, road_signal
 from analysis.methods.modes import modes
 from analysis.methods.sampled_series import sampled_series
 from analysis.methods.series import Series, exact_series, partial_sums, successive_ratios
-from analysis.methods.signals import Piece, Signal, harmonic
+from analysis.methods.signals import Piece, Signal, constant, harmonic
 from analysis.methods.standard_form import StandardForm, perturbed, standard_form
 from fmu_src.road.profiles import RoadParameters
 from fmu_src.vehicle.parameters import Car
@@ -136,6 +136,25 @@ def test_mathieus_first_correction(frequency: float) -> None:
 def test_internal_resonances_show_themselves_by_name(stiffness: float, expected: set[str]) -> None:
     """Only the first oscillator is displaced: the second one gets a secular term in resonance, and only there."""
     assert names(series(pair(stiffness), [1.0, 0.0, 0.0, 0.0], 1), 1) == expected
+
+
+@pytest.mark.parametrize(
+    ("w", "expected"),
+    [
+        (harmonic([0.3], 0.7), {"λ_1 = 2 λ_1 + λ_2", "λ_1 = λ_1 + σ_1 + σ_2"}),
+        (constant([0.3]), {"λ_1 = 2 λ_1 + λ_2", "λ_1 = λ_1 + 2 σ_1"}),
+    ],
+    ids=["sine", "constant"],
+)
+def test_waves_that_cancel_are_kept_in_the_name_of_what_they_make_grow(w: Signal, expected: set[str]) -> None:
+    """Forced Duffing: the frequency of the free motion is shifted by itself and by the forced one."""
+    form = standard_form(lambda z, w, s, c: [z[1], -z[0] - z[0] * z[0] * z[0] + w[0]], ["x", "v"], 1)
+    found = series(form, [1.0, 0.0], 1, w)
+    assert names(found, 1) == expected
+    forced = 0.3 / (1.0 - 0.7**2) if len(w.pieces[0].exponents) > 1 else 0.3 * np.sqrt(2.0)
+    drift = [s.coefficient for s in found.secular if "σ" in str(s)]
+    free = (modes(form.A).K_inverse @ np.array([1.0 - (forced if len(w.pieces[0].exponents) > 1 else 0.3), 0.0]))[0]
+    assert sum(drift) / free == pytest.approx(0.75j * forced**2, rel=1e-9)
 
 
 def test_a_near_resonance_is_named_with_its_distance() -> None:

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..methods.amplitudes import Stability, stability
-from ..methods.averaging import average
+from ..methods.averaging import average, slow
 from ..methods.modal_polynomials import exponents, modal_parts, waves
 from ..methods.modes import Complex, modes
 from ..methods.signals import Piece
@@ -116,7 +116,8 @@ def conditions(form: StandardForm, piece: Piece | None, prove: Callable[[], Proo
 
     piece : the input's last piece, None where it ends.  prove : of a motion under the whole input, see `Proof`.
     """
-    growth, equations = growth_of(form, piece), average(form, piece)
+    found = modes(form.A)
+    growth, equations = growth_of(form, piece), average(form, piece, found=found, detuning=slow(found))
     averaged, linear = stability(equations), float(equations.linear.real.max())
     return as_printed(growth, linear), by_averaging(averaged), by_normal_form(growth, averaged), by_proof(prove)
 
@@ -148,9 +149,7 @@ def as_printed(growth: Growth, linear: float) -> Verdict:
 def by_averaging(averaged: Stability) -> Verdict:
     """Only exp(iβt) is taken out: Re(α_k + A_k + B_k) < 0, the Floquet exponents' real parts to the order of A²."""
     most = -averaged.margin
-    critical = averaged.critical_scale.min()
-    more = f"0 at {critical:.3g} times this input" if critical < np.inf else "at any height of this input"
-    reason = f"largest Re(alpha_k + A_k + B_k), {more}"
+    reason = f"largest Re(alpha_k + A_k + B_k), {averaged.lost}"
     return Verdict(name="C1", holds=most < 0.0, number=most, reason=reason)
 
 

@@ -6,6 +6,7 @@ from ..bertolino_baksa.conditions import Verdict, conditions
 from ..car import car_form, road_signal
 from ..methods.signals import Piece
 from ..reference import Parameters, car_of, road_parameters
+from .car_amplitudes import amplitude_lines
 from .car_certificates import prove_reference
 
 TITLES = {
@@ -28,11 +29,12 @@ def _last(parameters: Parameters) -> Piece | None:
 
 
 def command(parameters: Parameters) -> int:
-    """Print the verdicts; 0 if the verdict of record, C3's, is that it holds, else 1."""
+    """Print the verdicts and the amplitudes' table; 0 if the verdict of record, C3's, is that it holds, else 1."""
     verdicts = car_verdicts(parameters)
     for v in verdicts:
         print(f"{v.name}  {'holds' if v.holds else 'fails'}  {v.number:11.4g}  {TITLES[v.name]}")
         print(f"                        {v.reason}")
+    print("\n".join(amplitude_lines(parameters, _last(parameters))))
     print(
         f"verdict of record (C3): x_lin {'is' if verdicts[-1].holds else 'is not proved to be'} almost stable for all t"
     )

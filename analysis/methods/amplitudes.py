@@ -13,67 +13,134 @@ from .modes import Complex
 from .polynomials import Array
 
 MOST_MODES = 12  # whose subsets are tried
+LEFT_OUT = 0.1  # of a motion, that averaging may leave out and still describe it
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Stability:
     """The condition Re(α_k + ε(A_k + B_k)) < 0, mode by mode (n,).
 
-    growth            : the left-hand side [1/s].
+    growth            : the left-hand side [1/s]; where s_k' is linear in other s_j too (modes of equal frequency, a
+                        resonance near by) with the sizes of those terms added: it bounds the growth of max |s_k|.
     critical_scale    : factor on the input at which it becomes 0; inf if it never does.
     critical_amplitude: |s_k| at which the mode's own cubic term cancels its decay; inf if it never does.
+    valid_scale       : factor on the input up to which averaging leaves out at most LEFT_OUT of a small free motion
+                        and of the forced one; a critical scale beyond it is the formula's, not the system's.
+    valid_amplitudes  : |s_k| up to which it leaves out at most LEFT_OUT of a motion of mode k alone.
     """
 
     growth: Array
     critical_scale: Array
     critical_amplitude: Array
+    valid_scale: float
+    valid_amplitudes: Array
 
     @property
     def margin(self) -> float:
         """Smallest decay rate [1/s]; the condition holds if > 0."""
         return float(-self.growth.max())
 
+    @property
+    def lost(self) -> str:
+        """At which height of the input the condition is lost, as far as averaging can tell."""
+        critical = float(self.critical_scale.min())
+        if critical < np.inf and critical <= self.valid_scale:
+            return f"lost at {critical:.3g} times this input"
+        if self.valid_scale < np.inf:
+            return f"not lost up to {self.valid_scale:.3g} times this input, where averaging ends"
+        return "at any height of this input"
+
 
 def stability(equations: AmplitudeEquations) -> Stability:
     """The condition with its margins.
 
-    Raises InputError where it does not decide: linear terms couple amplitudes, or a resonance forces one.
+    Raises InputError where it does not decide: a resonance forces an amplitude, or couples some too strongly.
     """
-    _only_own(equations)
-    alpha, linear = equations.modes.alpha, equations.linear
-    by_waves = _linear_by_waves(equations)
-    growth, own = alpha + linear.real, equations.cubic.real
+    _not_forced(equations)
+    alpha, by_waves = equations.modes.alpha, _linear_by_waves(equations)
+    growth, own = alpha + by_waves.sum(axis=1), equations.cubic.real
+    coupled = _coupled(equations)
+    if coupled and not growth.max() < 0.0:
+        k = int(np.argmax(growth))
+        raise InputError(
+            f"condition after (3.20): wanted s_{k + 1}' to have no linear term but s_{k + 1}, or small ones, got "
+            f"{', '.join(coupled)}: modes of equal frequency (or that do not oscillate), or near a resonance"
+        )
     half = own.shape[1]
     return Stability(
         growth=growth,
-        critical_scale=np.array([_first_root([a, *row[1:]]) for a, row in zip(alpha, by_waves.real, strict=True)]),
+        critical_scale=np.array([_first_root([a, *row[1:]]) for a, row in zip(alpha, by_waves, strict=True)]),
         critical_amplitude=np.array([_amplitude(growth[k], own[k, k % half]) for k in range(len(growth))]),
+        valid_scale=_valid_scale(equations),
+        valid_amplitudes=np.array([_valid_amplitude(equations, k) for k in range(len(growth))]),
     )
 
 
-def _only_own(equations: AmplitudeEquations) -> None:
-    """Raise InputError if s_k' has a constant, or s_j with another j."""
+def left_out(equations: AmplitudeEquations, s: Complex) -> float:
+    """Bound on |W| [m or rad], which averaging leaves out, at amplitudes s (n,): Σ of its terms' sizes."""
+    z = np.concatenate([np.abs(s), np.ones(len(equations.waves.frequencies))])
+    sizes = (np.abs(W.coefficients) @ np.prod(z[W.monomials], axis=1) for W in equations.correction)
+    return float(np.max(sum(sizes, np.zeros(equations.n))))
+
+
+def _not_forced(equations: AmplitudeEquations) -> None:
+    """Raise InputError if s_k' has a constant."""
     for part in equations.resonant:
         for k, monomial, _ in part.entries():
-            free = [i for i in monomial if i < equations.n]
-            if len(free) < 2 and free != [k]:
-                term = f"s_{free[0] + 1}" if free else "a constant"
+            if all(i >= equations.n for i in monomial):
                 raise InputError(
-                    f"condition after (3.20): wanted s_{k + 1}' to have no linear term but s_{k + 1}, got {term}: "
-                    "modes of equal frequency (or that do not oscillate), or a road in resonance"
+                    f"condition after (3.20): wanted s_{k + 1}' to have no linear term but s_{k + 1}, got a constant: "
+                    "a road in resonance, or modes that do not oscillate"
                 )
 
 
-def _linear_by_waves(equations: AmplitudeEquations) -> Complex:
-    """Coefficients of s_k in s_k' (n, P) by the number of waves in them: they grow with that power of the input."""
+def _coupled(equations: AmplitudeEquations) -> list[str]:
+    """The first other s_j that each s_k' is linear in, in words."""
+    found: dict[int, str] = {}
+    for part, delta in zip(equations.resonant, equations.detunings, strict=True):
+        for k, column in zip(*np.nonzero(part.coefficients), strict=True):
+            free = [i for i in part.monomials[column] if i < equations.n]
+            if len(free) == 1 and (free[0] != k or delta[k, column] != 0.0):
+                found.setdefault(int(k), f"s_{free[0] + 1} in s_{k + 1}'")
+    return list(found.values())
+
+
+def _linear_by_waves(equations: AmplitudeEquations) -> Array:
+    """What terms linear in s add to the growth of |s_k| (n, P) by the number of waves in them: a power of the input.
+
+    Of s_k itself the real part; of the others, and of those that turn, the size.
+    """
     n, most = equations.n, max((part.degree for part in equations.resonant), default=1)
-    result = np.zeros((n, max(most, 2)), complex)
+    own, other = np.zeros((n, max(most, 2)), complex), np.zeros((n, max(most, 2)))
     for part, delta in zip(equations.resonant, equations.detunings, strict=True):
         for column, row in enumerate(part.monomials.tolist()):
             free = [i for i in row if i < n]
-            if len(free) == 1 and delta[free[0], column] == 0.0:
-                result[free[0], len(row) - 1] += part.coefficients[free[0], column]
-    return result
+            if len(free) == 1:
+                still = (np.arange(n) == free[0]) & (delta[:, column] == 0.0)
+                own[still, len(row) - 1] += part.coefficients[still, column]
+                other[~still, len(row) - 1] += np.abs(part.coefficients[~still, column])
+    return own.real + other
+
+
+def _valid_scale(equations: AmplitudeEquations) -> float:
+    """See `Stability`; inf without an input."""
+    n, forced = equations.n, float(np.abs(equations.waves.forced).max(initial=0.0))
+    degree = max((W.degree for W in equations.correction), default=1)
+    steady, free = np.zeros((2, n, degree))  # by powers of the input: of W without s over the forced motion, of ∂W/∂s
+    for W in equations.correction:
+        count = np.count_nonzero(W.monomials < n, axis=1)
+        steady[:, W.degree - 1] += np.abs(W.coefficients[:, count == 0]).sum(axis=1) / (forced or 1.0)
+        free[:, W.degree - 1] += np.abs(W.coefficients[:, count == 1]).sum(axis=1)
+    return min(_first_root([-LEFT_OUT, *row[1:]]) for row in (*steady, *free))
+
+
+def _valid_amplitude(equations: AmplitudeEquations, k: int) -> float:
+    n, half = equations.n, equations.n // 2
+    alone = np.zeros((n, max((W.degree for W in equations.correction), default=1)))
+    for W in equations.correction:
+        chosen = np.isin(W.monomials, [k % half, k % half + half]).all(axis=1)
+        alone[:, W.degree - 1] += np.abs(W.coefficients[:, chosen]).sum(axis=1)
+    return min(_first_root([-LEFT_OUT, *row[1:]]) for row in alone)
 
 
 def _first_root(coefficients: list[float]) -> float:

@@ -54,15 +54,18 @@ class AmplitudeEquations:
             rate = rate + turned @ np.prod(z[part.monomials], axis=1)
         return rate
 
-    def amplitudes(self, x: Array, t: float = 0.0) -> Complex:
-        """s (n,) of the state x (n,) at the time t; from order 2 on, W is taken off by iteration."""
+    def amplitudes(self, x: Array, t: Any = 0.0, *, exact: bool | None = None) -> Complex:
+        """s (n, …) of the states x (n, …) at the times t (…).
+
+        exact : whether W is taken off, by iteration; by default from order 2 on.
+        """
         whole = self.modes.K_inverse @ x - self.waves.forced @ self.waves.at(t)
         u = whole
-        for _ in range(50 if self.order > 1 else 0):
+        for _ in range(50 if (self.order > 1 if exact is None else exact) else 0):
             before, u = u, whole - self._correction(u, t)
             if np.abs(u - before).max() <= 1e-15 * np.abs(whole).max():
                 break
-        return u * np.exp(-1j * self.modes.beta * t)
+        return u * np.exp(-1j * np.multiply.outer(self.modes.beta, t))
 
     def states(self, s: Complex, t: Array) -> Array:
         """x (n, len(t)) of amplitudes s (n, len(t)) at the times t."""
@@ -118,7 +121,8 @@ def average(
     """The amplitude equations of x' = A x + B w + Σ εᵖ Φ_p, with w of this piece for ever.
 
     order    : 1, as (3.20), or 2, the second approximation.
-    detuning : terms no further than this [rad/s] from resonance are kept as resonant (with their slow phase).
+    detuning : terms no further than this [rad/s] from resonance are kept as resonant (with their slow phase); see
+               `slow`.
 
     The damping need not be small: what is taken out is divided by Σλ − λ_k, not by its imaginary part alone.
     Raises InputError for an input that is no sum of lasting waves, and for other orders.
@@ -157,8 +161,17 @@ def _detunings(monomials: Indices, m: Modes, rho: Complex) -> Array:
     return np.where(np.abs(delta) <= ROUND_OFF * np.abs(rho.imag).max(initial=0.0), 0.0, delta)
 
 
+def slow(m: Modes) -> float:
+    """A detuning [rad/s] to keep terms by: below it a phase turns more slowly than any mode decays; 0 undamped."""
+    return 0.5 * float(np.abs(m.alpha).min())
+
+
 def _resonant(monomials: Indices, m: Modes, rho: Complex, detuning: float) -> Any:
-    return np.abs(_detunings(monomials, m, rho)) <= detuning
+    """Of each mode and monomial (n, R), whether it is kept; of waves alone as in `waves`: by iΣω − λ, with damping."""
+    least = max(detuning, ROUND_OFF * np.abs(rho.imag).max(initial=0.0))
+    distances = np.abs(np.sum(rho[monomials], axis=1) - m.eigenvalues[:, None])
+    near = np.abs(_detunings(monomials, m, rho)) <= detuning
+    return near & (np.any(monomials < len(m.K), axis=1) | (distances <= least))
 
 
 def _compact(part: Homogeneous) -> Homogeneous:
@@ -197,13 +210,14 @@ def _product(part: Homogeneous, shift: Homogeneous, m: Modes, rho: Complex, detu
     part, shift = _compact(part), _compact(shift)
     n, found = len(m.K), dict[tuple[int, ...], Complex]()
     limit = detuning + ROUND_OFF * np.abs(rho.imag).max(initial=0.0)
-    shift_frequency = np.sum(rho.imag[shift.monomials], axis=1)
+    shift_exponent, shift_free = np.sum(rho[shift.monomials], axis=1), np.any(shift.monomials < n, axis=1)
     for place in range(part.degree):
         rest = np.delete(part.monomials, place, axis=1)
-        rest_frequency = np.sum(rho.imag[rest], axis=1)
+        rest_exponent, rest_free = np.sum(rho[rest], axis=1), np.any(rest < n, axis=1)
         for column, j in enumerate(part.monomials[:, place].tolist()):
             for k in np.flatnonzero(part.coefficients[:, column]) if j < n else ():
-                near = np.abs(rest_frequency[column] + shift_frequency - m.beta[k]) <= limit
+                gap = rest_exponent[column] + shift_exponent - m.eigenvalues[k]
+                near = np.where(rest_free[column] | shift_free, np.abs(gap.imag), np.abs(gap)) <= limit
                 for other in np.flatnonzero(near & (shift.coefficients[j] != 0.0)):
                     monomial = tuple(sorted((*rest[column].tolist(), *shift.monomials[other].tolist())))
                     value = part.coefficients[k, column] * shift.coefficients[j, other]

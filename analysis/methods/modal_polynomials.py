@@ -45,7 +45,8 @@ class Waves:
 def waves(form: StandardForm, modes: Modes, piece: Piece | None = None, *, detuning: float = 0.0) -> Waves:
     """The waves of an input for ever; none without a piece.
 
-    detuning : a wave no further than this [rad/s] from β_k is left to the amplitude of mode k if detuning > 0.
+    detuning : a wave iω no further than this [1/s] from λ_k is left to the amplitude of mode k if detuning > 0.
+               A mode that decays faster forgets its start sooner than the phase turns, and has a forced motion.
 
     Raises InputError if the input is no sum of waves that last.
     """
@@ -56,8 +57,9 @@ def waves(form: StandardForm, modes: Modes, piece: Piece | None = None, *, detun
     omega = piece.exponents.imag
     inputs = piece.amplitudes * np.exp(-1j * omega * piece.begin)  # phases at t = 0
     force = modes.K_inverse @ form.B @ inputs
-    near = np.abs(omega - modes.beta[:, None]) <= detuning if detuning > 0.0 else np.zeros(force.shape, bool)
-    divisors = np.where(near, 1.0, 1j * omega - modes.eigenvalues[:, None])
+    divisors = 1j * omega - modes.eigenvalues[:, None]
+    near = (np.abs(divisors) <= detuning) & (detuning > 0.0)
+    divisors = np.where(near, 1.0, divisors)
     return Waves(
         frequencies=omega,
         inputs=inputs,

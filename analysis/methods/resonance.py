@@ -24,6 +24,11 @@ from .signals import Piece
 from .standard_form import StandardForm
 
 SMALL = 0.01  # m or rad
+POINTS, FAR = (
+    33,
+    1e3,
+)  # times at which a largest response is looked for; the end of those that only rise, over their begin
+TINY = 1e-8  # |x| below which (exp(x) − 1)/x is 1 as near as matters
 SILENT = 1e-12  # of the largest coefficient of Φ: terms as small as this do not occur
 
 
@@ -36,7 +41,7 @@ class Resonance:
     distance    : smallest |Σ λ + i Σ ω − λ_k| [1/s] of its terms (of those in Φ, if any): damping counted.
     scale       : largest frequency in it [rad/s], by which both are made relative.
     coefficient : largest of its terms in Φ_k, on this road, with all |s| = size, over size [1/s]; 0 if there is none.
-    gain        : largest coefficient over distance of its terms: what the term adds to a motion, relative to it.
+    gain        : largest that one of its terms adds to a motion, at any time, relative to it; see `largest_forced`.
     """
 
     modes: tuple[int, ...]
@@ -159,8 +164,36 @@ def _terms(
     count = np.count_nonzero(monomials >= n, axis=1)
     values = (np.abs(table.coefficients[targets][:, used]) * size ** (table.degree - count - 1.0)).ravel()
     values = np.where(values > SILENT * values.max(initial=0.0), values, 0.0)
-    gains = values / np.maximum(distances, np.finfo(float).tiny) if table.degree > 1 else 0.0 * values
+    gains = np.zeros_like(values)
+    if table.degree > 1:
+        forcing, mode = np.broadcast_arrays(rho[monomials].sum(axis=1)[None], m.eigenvalues[targets][:, None])
+        occurs = values > 0.0
+        gains[occurs] = values[occurs] * largest_forced(forcing.ravel()[occurs], mode.ravel()[occurs])
     return _Terms(equalities.reshape(-1, unit.shape[1]), distances, values, gains, np.tile(count, len(targets)))
+
+
+def largest_forced(forcing: Complex, eigenvalues: Complex) -> Array:
+    """max |exp(σt) − exp(λt)|/|σ − λ| (R,) [s] over t ≥ 0, σ and λ (R,) [1/s]: of ξ' = λ ξ + exp(σt) from ξ(0) = 0.
+
+    Towards σ = λ this is 1/(e |Re λ|), not infinite: a decaying mode forgets what it was given. With a = Re σ,
+    b = Re λ, q = Im(σ − λ), its square is (exp(at) − exp(bt))² + 2 exp((a + b)t) (1 − cos qt), two humps with one top
+    each before π/|q|, behind which it falls below what it is there; so the largest value lies between the tops.
+    """
+    a, b, q = forcing.real, eigenvalues.real, np.abs(forcing.imag - eigenvalues.imag)
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+        r = np.where(a == b, 0.0, (b - a) / a)
+        first = np.where(r == 0.0, 1.0, np.log1p(r) / np.where(r == 0.0, 1.0, r)) / np.abs(a)
+        first = np.where((a == 0.0) | (b == 0.0), np.inf, first)
+        second = np.where(q == 0.0, -2.0 / (a + b), 2.0 * np.arctan2(q, -(a + b)) / q)
+        latest = np.pi / q
+        begin, end = (np.minimum(f(first, second), latest) for f in (np.minimum, np.maximum))
+        end = np.where(np.isinf(end) & np.isfinite(begin), begin * FAR, end)
+        t = begin * (end / begin) ** np.linspace(0.0, 1.0, POINTS)[:, None]
+        d = 1j * q - np.abs(a - b)  # seen from the one that decays more slowly
+        size = np.where(np.abs(d * t) < TINY, t, np.abs(np.expm1(d * t) / np.where(d == 0.0, 1.0, d)))
+        found = (np.exp(np.maximum(a, b) * t) * size).max(axis=0)
+    grows = (np.maximum(a, b) > 0.0) | (np.isinf(begin))
+    return np.where(grows, np.inf, found)
 
 
 def _unit_vectors(half: int, w: Waves, period: float) -> Integers:

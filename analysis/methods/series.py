@@ -32,7 +32,11 @@ LARGEST_DENOMINATOR = 1000  # of ratios of input frequencies that are taken for 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Secular:
-    """A term of the series that grows like a power of time times exp(λ_k t), and the sum of exponents that makes it."""
+    """A term of the series that grows like a power of time times exp(λ_k t), and the sum of exponents that makes it.
+
+    λ_1 = λ_1 + σ_1 + σ_2 with σ_2 = −σ_1, say, is the drift of an amplitude by a wave and its conjugate: A_k + B_k of
+    (3.20).
+    """
 
     order: int
     begin: float  # of the piece [s]
@@ -206,18 +210,17 @@ def _input(eigenvalues: Complex, piece: Piece) -> Exponentials:
 
 
 def common_rates(exponents: Complex) -> tuple[Complex, Integers]:
-    """Rates σ (R,) as few as found, and whole multiples (K, R) of them that are the exponents (K,).
+    """Rates σ (R,) as few as found, and whole multiples (K, R) >= 0 of them that are the exponents (K,).
 
-    Exponents in a rational ratio (the harmonics of a road, and conjugates) share a rate, so that sums of them that
-    are equal are found to be so.
+    Exponents in a positive rational ratio (the harmonics of a road) share a rate, so that sums of them that are equal
+    are found to be so. Opposite waves, and a constant, have rates of their own: where they cancel each other in a sum,
+    or add nothing to it, its name still says that they were in it.
     """
     firsts: list[complex] = []
     ratios: list[dict[int, Fraction]] = []
     for place, sigma in enumerate(exponents.tolist()):
-        if sigma == 0:
-            continue
         for first, members in zip(firsts, ratios, strict=True):
-            if (ratio := _rational(sigma / first)) is not None:
+            if (ratio := _ratio(sigma, first)) is not None:
                 members[place] = ratio
                 break
         else:
@@ -233,6 +236,10 @@ def common_rates(exponents: Complex) -> tuple[Complex, Integers]:
     return rates, multiples
 
 
-def _rational(ratio: complex) -> Fraction | None:
+def _ratio(sigma: complex, first: complex) -> Fraction | None:
+    """sigma/first if that is rational and positive."""
+    if 0 in (sigma, first):
+        return Fraction(1) if sigma == first else None
+    ratio = sigma / first
     near = Fraction(ratio.real).limit_denominator(LARGEST_DENOMINATOR)
-    return near if near and abs(ratio - float(near)) <= 1e-14 * abs(ratio) else None
+    return near if near > 0 and abs(ratio - float(near)) <= 1e-14 * abs(ratio) else None

@@ -3,7 +3,8 @@
 Damping couples the modes of (3.12), whose energies do not add up. Here a mode is one of the undamped linear system
 M q'' + C q = 0: with η = Vᵀ M q, its energy is ½ (η'² + ω² η²); all modes together have ½ q'ᵀ M q' + ½ qᵀ C q, exactly.
 A linear system moves energy between its modes as well (by damping, and because a force meets several of them); what
-the paper calls spatial instability needs Φ, so it is the change against the linear motion under the same input.
+the paper calls spatial instability needs Φ, so it is the change against the linear motion under the same input: a mode
+that gains much, be it at the cost of others or of the input, and most of all one that the input does not drive.
 """
 
 from __future__ import annotations
@@ -15,6 +16,8 @@ from scipy.linalg import eigh
 
 from ..errors import InputError
 from .polynomials import Array
+
+UNDRIVEN = 1e-3  # of the linear energy: a mode with less is hardly driven
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -65,13 +68,25 @@ class Transfer:
         return (self.nonlinear - self.linear) / self.linear.sum()
 
     @property
-    def indicator(self) -> float:
+    def moved(self) -> float:
         """Share of the energy that Φ moves from modes that lose to modes that gain: the smaller of both sums.
 
-        0 if all modes gain or all lose; it cannot exceed 1.
+        0 if all modes gain or all lose, as where Φ lets a mode take more from the road; it cannot exceed 1.
         """
         change = self.change
-        return float(min(change[change > 0.0].sum(), -change[change < 0.0].sum()))
+        return float(min(change[change > 0.0].sum(), abs(change[change < 0.0].sum())))
+
+    @property
+    def largest_gain(self) -> float:
+        """What Φ adds to the mode that gains most, wherever it comes from, over the whole linear energy; 0 if none."""
+        return float(max(0.0, self.change.max()))
+
+    @property
+    def undriven_share(self) -> float:
+        """Largest energy in the full motion of a mode that has less than UNDRIVEN of the whole in the linear one, over
+        the whole linear energy: more than UNDRIVEN is Φ's doing. 0 if there is no such mode."""
+        whole = self.linear.sum()
+        return float(self.nonlinear[self.linear < UNDRIVEN * whole].max(initial=0.0) / whole)
 
 
 def transfer(modes: UndampedModes, t: Array, linear: Array, nonlinear: Array) -> Transfer:

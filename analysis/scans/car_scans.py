@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fmu_src.quantities import PARAMETERS
+from fmu_src.road.profiles import HARMONICS
 
 from ..car import car_form, road_signal
 from ..errors import InputError
@@ -62,6 +63,12 @@ def variation(name: str) -> Variation:
     if name not in VARIATIONS:
         raise InputError(f"--scan {name}: wanted one of {', '.join(VARIATIONS)}")
     return VARIATIONS[name]
+
+
+def higher_road(parameters: Parameters, factor: float) -> Parameters:
+    """All heights of the road times a factor."""
+    heights = {name: factor * _real(parameters, name) for name in ("A", *HARMONICS)}
+    return {**parameters, **heights}
 
 
 def lasting_road(parameters: Parameters) -> Piece | None:

@@ -50,7 +50,7 @@ def _curves(scan: Scan, attribute: str, words: str) -> Panel:
     def panel(ax: Axes) -> Axes:
         gain = attribute == "gain"
         values = [getattr(row, attribute) for row in (scan.strongest() if gain else scan.nearest(attribute))]
-        what = "strongest of all" if gain else "nearest of all"
+        what = "strongest of all" if gain else "nearest of those that change"
         ax.semilogy(scan.values, values, color=GREY, linestyle="-", linewidth=3.0, alpha=0.5, label=what)
         for key, color in zip(_leading(scan, attribute), COLOURS, strict=False):
             row = next(table[key] for table in scan.tables if key in table)
@@ -64,9 +64,9 @@ def _curves(scan: Scan, attribute: str, words: str) -> Panel:
 
 
 def _leading(scan: Scan, attribute: str) -> list[Key]:
-    """The resonances that come nearest (are strongest) anywhere on the map."""
+    """The resonances that come nearest, of those that change, or are strongest anywhere on the map."""
     sign = -1.0 if attribute == "gain" else 1.0
-    keys = {key for table in scan.tables for key in table}
+    keys = {key for table in scan.tables for key in table} if attribute == "gain" else scan.changing
     return sorted(keys, key=lambda key: (np.nanmin(sign * scan.curve(key, attribute)), key))[: len(COLOURS)]
 
 

@@ -24,12 +24,13 @@ from ..methods.spatial import Transfer, UndampedModes, transfer, undamped_modes
 from ..parallel import mapped
 from ..reference import Parameters, car_of
 from ..scenario import read_scenario
-from .car_scans import VARIATIONS, system_of, variation
+from .car_scans import VARIATIONS, higher_road, system_of, variation
 from .resonance_scan import as_csv, output_folder
 
 SPAN, SAMPLES = 5.0, 501  # s from rest, and times in it
 RTOL = 1e-9  # of the full equations; Φ's share is seen down to about this
 STEPS = (9, 3)  # speeds, and values of the other parameter
+HEIGHTS = (4.0, 16.0)  # times the road's own, at the worst point
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -84,23 +85,68 @@ def _factors(count: int) -> Array:
     return np.geomspace(0.5, 2.0, count) if count > 1 else np.ones(1)
 
 
+def changed(parameters: Parameters, values: dict[str, float]) -> Parameters:
+    """The parameters with those values of VARIATIONS."""
+    for name, value in values.items():
+        parameters = variation(name).changed(parameters, value)
+    return parameters
+
+
+def worst_of(points: list[Point]) -> Point:
+    """Where Φ adds most to one mode."""
+    return max(points, key=lambda point: point.transfer.largest_gain)
+
+
+def edges(worst: Point, points: list[Point]) -> list[str]:
+    """Parameters of the worst point that have the smallest or the largest value of the grid."""
+    found = []
+    for name, value in worst.values.items():
+        others = [point.values[name] for point in points if name in point.values]
+        if value in (min(others), max(others)) and min(others) < max(others):
+            found.append(name)
+    return found
+
+
 # ------------------------------------------------------------------ on the terminal
 def command(scenario: str, out: Path | None) -> int:
-    """The verb `spatial`; returns the exit status."""
+    """The verb `spatial` on a scenario; returns the exit status."""
     parameters = read_scenario(scenario).parameters
     print("\n".join(lines(parameters, f"{scenario}, passive")))
     points = grid(parameters, STEPS)
-    worst = max(points, key=lambda point: point.transfer.indicator)
-    there = dict(parameters)
-    for name, value in worst.values.items():
-        there = variation(name).changed(there, value)
-    words = ", ".join(f"{name} = {value:.4g}" for name, value in worst.values.items())
-    print("\n".join(lines(there, f"worst of {len(points)}: {words}")))
+    worst = worst_of(points)
+    there = changed(parameters, worst.values)
+    edge = edges(worst, points)
+    where = f"; on the edge of the grid in {' and '.join(edge)}: it may be worse beyond" if edge else ""
+    print("\n".join(lines(there, f"worst of {len(points)}, by the largest gain of one mode: {in_words(worst)}{where}")))
+    for quality, words in (("moved", "moves most between modes"), ("undriven_share", "gives most to an undriven mode")):
+        most = max(points, key=lambda point: getattr(point.transfer, quality))
+        print(f"where Φ {words}: {in_words(most)}: {getattr(most.transfer, quality):.3g}")
+    print("\n".join(heights(there)))
     if out:
         output_folder(out)
         write_whole(out / "spatial.csv", as_csv(_rows(points)))
         print(f"{out / 'spatial.csv'}: written")
     return 0
+
+
+def in_words(point: Point) -> str:
+    return ", ".join(f"{name} = {value:.4g}" for name, value in point.values.items())
+
+
+def heights(parameters: Parameters) -> list[str]:
+    """What Φ does there on higher roads."""
+    return [
+        f"there, on the road {factor:g} times as high: {said(transfer_of(higher_road(parameters, factor)))}"
+        for factor in HEIGHTS
+    ]
+
+
+def said(found: Transfer) -> str:
+    """The three measures of a transfer."""
+    return (
+        f"largest gain of one mode {found.largest_gain:.3g} of the linear energy, moved between modes "
+        f"{found.moved:.3g}, largest share of an undriven mode {found.undriven_share:.3g}"
+    )
 
 
 def lines(parameters: Parameters, what: str) -> list[str]:
@@ -111,8 +157,7 @@ def lines(parameters: Parameters, what: str) -> list[str]:
     largest: Array = np.abs(linear[:7]).max(axis=1)
     deviation: Array = np.abs(full - linear)[:7].max(axis=1)
     text = [
-        f"{what}: mean energy {found.linear.sum():.4g} J over {SPAN:g} s; moved between modes by Φ: "
-        f"{found.indicator:.3g} of it",
+        f"{what}: mean energy {found.linear.sum():.4g} J over {SPAN:g} s; by Φ: {said(found)}",
         f"{'mode':>6}{'ω [rad/s]':>12}{'linear share':>14}{'change by Φ':>14}"
         f"   {'coordinate':<17}{'linear share':>12}{'change by Φ':>14}{'|x − x_lin| / |x_lin|':>24}",
     ]
@@ -129,7 +174,9 @@ def lines(parameters: Parameters, what: str) -> list[str]:
 def _rows(points: list[Point]) -> list[list[object]]:
     heads = [
         *VARIATIONS,
-        "indicator [1]",
+        "largest gain of one mode [1]",
+        "moved between modes [1]",
+        "largest share of an undriven mode [1]",
         *(f"linear share {k}" for k in range(1, 8)),
         *(f"change {k}" for k in range(1, 8)),
     ]
@@ -139,7 +186,9 @@ def _rows(points: list[Point]) -> list[list[object]]:
         rows.append(
             [
                 *(p.values.get(name, "") for name in VARIATIONS),
-                p.transfer.indicator,
+                p.transfer.largest_gain,
+                p.transfer.moved,
+                p.transfer.undriven_share,
                 *shares.tolist(),
                 *p.transfer.change.tolist(),
             ]
