@@ -41,7 +41,7 @@ STARTS = 2  # of it where the inputs are tied
 
 @dataclass(frozen=True, slots=True)
 class Bounds:
-    """|w_i(t)| ≤ sizes_i (m,) for all t ≥ 0; `tied`: the second half are the rates of the first, 0 at t = 0."""
+    """|w_i(t)| ≤ sizes_i (m,) for all t ≥ 0; `tied`: the first half Lipschitz, 0 at t = 0, the second their rates."""
 
     sizes: Array
     tied: bool = False

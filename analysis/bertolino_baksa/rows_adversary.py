@@ -46,23 +46,26 @@ def _signs(form: StandardForm, rows: InputRows) -> Array:
 
 def _steps(rows: InputRows, signs: Array) -> Iterator[tuple[float, list[Array]]]:
     """Steps [s] no longer than STEP, two or more from row to row, and w (m, K) at begin, middle and end of each."""
-    widths, ones = np.diff(rows.times), np.ones(signs.shape[2])
-    for width, heights, slope, side in zip(widths.tolist(), rows.heights, rows.slopes, signs, strict=False):
+    for width, heights, slope, side in zip(rows.steps.tolist(), rows.heights, rows.slopes, signs, strict=False):
         parts = 2 * int(np.ceil(width / (2.0 * STEP)))
         h = width / parts
         for part in range(parts):
             inputs = []
             for s in (0.0, 0.5, 1.0):
-                up, rate = bow(rows.between, width, (part + s) * h, (part + 0.5) * h, slope[:, None])
-                height = heights[:, None] + (part + s) * h * slope[:, None] + side * up
-                inputs.append(np.concatenate([height * ones, slope[:, None] + side * rate]))
+                up, rate = beside(rows.between, width, (part + s) * h, slope[:, None], side)
+                chord = heights[:, None] + (part + s) * h * slope[:, None]
+                inputs.append(np.concatenate([chord + up, slope[:, None] + rate]))
             yield h, inputs
 
 
-def bow(between: RowClass, width: float, s: float, inside: float, slope: Array) -> tuple[Array, Array]:
-    """The largest height over a chord of this slope that the class has at s in all of a step at once, or nearly so, and
-    its rate; `inside` tells on which side of a corner s lies."""
+def beside(between: RowClass, width: float, s: float, slope: Array, side: Array) -> tuple[Array, Array]:
+    """How far (k, K) a height of the class may be off its chord of this slope (k, 1), 0 ≤ s ≤ width, and its rate.
+
+    side : (k, K) from −1 to 1, the share of the furthest height below or above, which is furthest at all s.
+    """
+    H, sign = between.bound, np.sign(side)
     if between.kind == "curv":
-        return between.bound * s * (width - s) / 2.0 + 0.0 * slope, between.bound * (width / 2.0 - s) + 0.0 * slope
-    rate = np.maximum(between.bound - np.abs(slope), 0.0)
-    return rate * min(s, width - s), rate * (1.0 if inside < width / 2.0 else -1.0)
+        return side * H * s * (width - s) / 2.0, side * H * (width / 2.0 - s)
+    up, down = np.maximum(H - sign * slope, 0.0), np.maximum(H + sign * slope, 0.0)
+    rising = s * up <= (width - s) * down
+    return side * np.where(rising, s * up, (width - s) * down), side * np.where(rising, up, -down)
