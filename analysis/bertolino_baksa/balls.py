@@ -144,15 +144,17 @@ def coefficients(series: Any, length: int) -> list[Any]:
 
 
 def jacobian(system: ExactSystem, x: Balls, w: Balls, *, inputs: bool = False) -> arb_mat:
-    """∂F/∂x (n, n), or ∂F/∂w (n, m), over the balls x and w: one pass with a nilpotent increment for each column."""
-    columns = []
-    with precision(2):
-        for j in range(system.m if inputs else system.n):
-            xs, ws = list(x), list(w)
-            moved = ws if inputs else xs
-            moved[j] = arb_series([moved[j], 1])
-            columns.append([coefficients(rate, 2)[1] for rate in system.equations(xs, ws, sine, cosine)])
-    return arb_mat(columns).transpose()
+    """∂F/∂x (n, n), or ∂F/∂w (n, m), over the balls x and w.
+
+    The increments of k variables are s^k … s^(2k − 1) in a series in s of 2k terms, which drops their products: all
+    columns come from one pass.
+    """
+    moved = w if inputs else x
+    k = len(moved)
+    with precision(2 * k):
+        series = [arb_series([v, *[0] * (k - 1 + j), 1]) for j, v in enumerate(moved)]
+        rates = system.equations(*((x, series) if inputs else (series, w)), sine, cosine)
+        return arb_mat([coefficients(rate, 2 * k)[k:] for rate in rates])
 
 
 def two_norm(m: Array) -> Array:

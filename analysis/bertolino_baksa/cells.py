@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 from flint import arb, arb_mat
@@ -154,11 +155,18 @@ def inputs(system: ExactSystem, metric: Metric, pieces: Sequence[Piece]) -> Arra
 
 def errors(tube: Tube, metric: Metric, norm: Norm) -> Array:
     """sup N(e) over each of the cells of `decay`, from finer ones in it."""
+    if norm.largest:
+        return np.asarray(errors_by_rows(tube, metric, norm).max(axis=1))
     found, c = [], metric.of(norm)
     for values, bend, V in finely(tube, metric, norm):
-        sizes = np.abs(values).max(axis=1) if norm.largest else np.sqrt((values**2).sum(axis=1))
-        curved = bend.max() if norm.largest else np.sqrt((bend**2).sum())
-        found.append(sizes.max(axis=1) + curved + c * V)
+        found.append(np.sqrt((values**2).sum(axis=1).max(axis=1)) + np.sqrt((bend**2).sum()) + c * V)
+    return np.concatenate(found) * (1 + EPS)
+
+
+def errors_by_rows(tube: Tube, metric: Metric, norm: Norm) -> Array:
+    """sup |(T e)_i| (N, n) over each of the cells of `decay`, from finer ones in it."""
+    c = metric.rows(norm.T)
+    found = [np.abs(values).max(axis=2) + bend + c * V for values, bend, V in finely(tube, metric, norm)]
     return np.concatenate(found) * (1 + EPS)
 
 
@@ -179,10 +187,17 @@ def sampled(coefficients: Array, cells: int, sizes: Array | None = None, begin: 
     sizes : of the coefficients before they were combined, for the rounding of the combination.
     """
     k = np.arange(coefficients.shape[1])
-    powers = np.linspace(begin, 1.0, cells + 1)[None, :] ** k[:, None]
     sizes = np.abs(coefficients) if sizes is None else sizes
     second = (sizes * k * (k - 1)).sum(axis=1)
-    return coefficients @ powers, second * (1.0 - begin) ** 2 / (8.0 * cells**2) + EPS * sizes.sum(axis=1)
+    return coefficients @ _powers(len(k), cells, begin), second * (1.0 - begin) ** 2 / (
+        8.0 * cells**2
+    ) + EPS * sizes.sum(axis=1)
+
+
+@cache
+def _powers(count: int, cells: int, begin: float) -> Array:
+    """Powers (count, cells + 1) of the ends of cells that divide what lies between `begin` and 1; not to be written."""
+    return np.asarray(np.linspace(begin, 1.0, cells + 1)[None, :] ** np.arange(count)[:, None])
 
 
 def errors_of_states(tube: Tube, metric: Metric) -> Array:

@@ -107,8 +107,12 @@ class Majorant:
         return self.signed @ self._products(y)
 
     def _products(self, y: Array) -> Array:
-        factors = np.concatenate([y, np.ones((1, y.shape[1]))])[self.monomials]
-        return np.asarray(np.multiply.reduce(factors, axis=1))
+        factors = np.concatenate([y, np.ones((1, y.shape[1]))])
+        first, *others = self.monomials.T
+        products = factors[first]
+        for each in others:
+            products *= factors[each]
+        return products
 
     def tail(self, far: Array, Y: Array) -> Array:
         """Bound (n, K) of how the tail changes by Y (n + m, K) on the box far (n + m, K), inf out of the whole box."""

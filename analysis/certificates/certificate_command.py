@@ -22,13 +22,12 @@ from ..bertolino_baksa.proof import Proof
 from ..bertolino_baksa.search import largest
 from ..bertolino_baksa.tube import Tube
 from ..car import car_form, road_signal
-from ..energy import tyre_heights
 from ..errors import InputError
 from ..files import write_whole
 from ..methods.polynomials import Array
 from ..reference import Parameters, car_of, road_parameters
 from ..trajectory import CERTIFICATE
-from ..tyres import static_loads_of
+from ..tyres import static_loads_of, tyre_heights
 from .car_bounded_roads import statement as every_road
 from .car_certificates import build, car_norms, certify_car, prove_reference
 from .certificate_words import model_words, named_by_content, refuse_exceeded, start_words
