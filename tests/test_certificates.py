@@ -17,8 +17,9 @@ from analysis.bertolino_baksa.adversary import excursions, reached, reference_fl
 from analysis.bertolino_baksa.balls import NotProvedError, precision
 from analysis.bertolino_baksa.certificate import Certificate, from_json, to_json, verify
 from analysis.bertolino_baksa.norms import proved_metric
+from analysis.bertolino_baksa.pieces import Piece
 from analysis.bertolino_baksa.proof import Proof, prove
-from analysis.bertolino_baksa.tube import Piece, prove_linear
+from analysis.bertolino_baksa.tube import prove_linear
 from analysis.car import car_form, road_signal
 from analysis.certificates.car_certificates import build, certify_car, model_of, prove_reference
 from analysis.cosimulation import simulate

@@ -65,15 +65,15 @@ def _steps(signal: Signal, stop: float, step: float) -> Iterator[tuple[Piece, Ar
 
 def reference_error(form: StandardForm, signal: Signal, x0: Array, stop: float, step: float) -> tuple[Array, Array]:
     """Times (N,) [s], those of `motions`, and e = x − x_lin (n, N) of the motion from x0 itself, tightly integrated."""
-    times, found = [np.array(signal.edges[:1])], [np.zeros((len(x0), 1))]
-    finer = 2 * int(np.ceil(step / STEP))
-    for piece, at in _steps(signal, stop, step):
-        t = np.linspace(at[0], at[-1], finer * (len(at) - 1) + 1)
-        x_lin = linear_response(form.A, form.B, x0, signal, t)
-        e = deviation(form, x_lin, piece(t), found[-1][:, -1], t[1] - t[0])
-        times.append(at[1:])
-        found.append(e[:, finer::finer])
-    return np.concatenate(times), np.concatenate(found, axis=1)
+    finer, steps = 2 * int(np.ceil(step / STEP)), list(_steps(signal, stop, step))
+    times = [np.linspace(at[0], at[-1], finer * (len(at) - 1) + 1) for _, at in steps]
+    x_lin = np.split(
+        linear_response(form.A, form.B, x0, signal, np.concatenate(times)), np.cumsum([len(t) for t in times])[:-1], 1
+    )
+    e = [np.zeros((len(x0), 1))]
+    for (piece, _), t, along in zip(steps, times, x_lin, strict=True):
+        e.append(deviation(form, along, piece(t), e[-1][:, -1], t[1] - t[0])[:, finer::finer])
+    return np.concatenate([signal.edges[:1], *(at[1:] for _, at in steps)]), np.concatenate(e, axis=1)
 
 
 def _offsets(

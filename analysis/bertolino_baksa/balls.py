@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 Balls = Sequence[Any]
 BITS = 96
+UNIT, TINY = 2.0**-52, 1e-300  # rounding of a float, relative and, of few of them, where they are denormal
 Inputs = Callable[[Any], list[Any]]
 
 
@@ -130,11 +131,17 @@ def magnitudes(m: arb_mat) -> Array:
 
 
 def rounded(m: arb_mat) -> tuple[Array, float]:
-    """Exact floats near the entries, and a bound of the sum of what is left (hence of its norms)."""
-    entries = m.entries()
-    centre = [float(v.mid()) for v in entries]
-    rest = sum((abs(v - arb(c)) for v, c in zip(entries, centre, strict=True)), arb(0))
-    return np.array(centre).reshape(m.nrows(), m.ncols()), above(rest)
+    """Exact floats near the entries, and a bound of the sum of what is left (hence of its norms).
+
+    What is left are the balls' radii, of which a row's sum has at least as much, and half a unit of each float, or one.
+    Raises NotProvedError unless that is finite.
+    """
+    centre = np.array([float(v) for v in m.entries()]).reshape(m.nrows(), m.ncols())
+    sums = m * arb_mat([[1]] * m.ncols())
+    rest = above(sum((v.rad() for v in sums.entries()), arb(0))) + UNIT * float(np.abs(centre).sum())
+    if not rest < math.inf:
+        raise NotProvedError(f"no finite bound: {m}")
+    return centre, rest * (1.0 + 1e-9) + TINY
 
 
 def coefficients(series: Any, length: int) -> list[Any]:

@@ -15,7 +15,8 @@ from flint import arb, arb_mat
 
 from .balls import Array, ExactSystem, above, magnitudes, matrix, rounded, two_norm
 from .norms import Metric, Norm
-from .tube import Outputs, Piece, Tube, enclosed_series
+from .pieces import Piece
+from .tube import Outputs, Tube, enclosed_series
 
 CELLS, LATE_CELLS = 12, 3  # per piece, for e^(At) and the growth of perturbations: at first, and from
 LATE = 2.0  # times the slowest time constant on, when what oscillates fast has died out

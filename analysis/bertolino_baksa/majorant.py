@@ -122,10 +122,10 @@ class Majorant:
     def change(self, X: Array, at_X: Array, Y: Array) -> Array:
         """Bound (n, K) of |R(x + y, w) − R(x, w)|, inf out of the box.
 
-        X (n + m,) bounds (x, w), Y (n + m, K) bounds (y, 0); at_X (n,) is R̄(X).
+        X (n + m, K or 1) bounds (x, w), Y (n + m, K) bounds (y, 0); at_X (n, K or 1) is R̄(X).
         """
-        far = X[:, None] + Y
-        return (self(far) * (1.0 + SLACK) - at_X[:, None] * (1.0 - SLACK) + self.tail(far, Y)) * (1.0 + SLACK)
+        far = X + Y
+        return (self(far) * (1.0 + SLACK) - at_X * (1.0 - SLACK) + self.tail(far, Y)) * (1.0 + SLACK)
 
 
 def majorant(system: ExactSystem, box: Array) -> Majorant:

@@ -21,9 +21,10 @@ from .cells import Decay, counts, decay, inputs, ranges, sampled, widths
 from .growth import perturbed
 from .majorant import Majorant, majorant
 from .norms import Metric, Norm
+from .pieces import Piece
 from .proof import rest_growth
 from .taylor import find_pieces
-from .tube import Piece, at_end, prove_linear
+from .tube import at_end, prove_linear
 
 ROOM, SHARE = 2.0, 0.1  # of the box, over x_lin's sizes, and over what a motion of its size could be in each state
 POINTS = 4  # of a cell, for R along x_lin
@@ -95,15 +96,15 @@ def _states(bound: Majorant, X: Array, along: Array, e: Array, flow: Decay, left
     """
     ends = np.concatenate([[0.0], np.cumsum(flow.width)])
     h, n = float(ends[-1]) / WINDOWS * SLACK, e.shape[1]
-    edges, at_X = h * np.arange(WINDOWS + 1), bound(X.T).T
+    edges, at_X = h * np.arange(WINDOWS + 1), bound(X.T)
     kernel = _over(ends, flow.sizes(np.concatenate(lefts)), edges[:-1] - h, edges[1:])  # of t − s, t and s in windows
     kernel = np.ascontiguousarray(kernel.transpose(1, 0, 2)).reshape(-1, WINDOWS * n)
-    for _ in range(PASSES):
+    for last in (False,) * (PASSES - 1) + (True,):
+        wanted = kernel if last else kernel[:n]
         moved = np.pad(e, ((0, 0), (0, X.shape[1] - n)))
-        more = [bound.change(x, at, y[:, None])[:, 0] for x, at, y in zip(X, at_X, moved, strict=True)]
-        forced = _over(ends, along + np.array(more), edges[:-1], edges[1:])
+        forced = _over(ends, along + bound.change(X.T, at_X, moved.T).T, edges[:-1], edges[1:])
         back = forced[::-1].ravel()
-        found = np.stack([kernel[:, : (k + 1) * n] @ back[(WINDOWS - 1 - k) * n :] for k in range(WINDOWS)])
+        found = np.stack([wanted[:, : (k + 1) * n] @ back[(WINDOWS - 1 - k) * n :] for k in range(WINDOWS)])
         found *= h * SLACK
         e = np.minimum(e, _over(edges, found[:, :n], ends[:-1], ends[1:]))
     return np.split(found, len(lefts), axis=1)

@@ -158,8 +158,8 @@ def measured(switched: Switched, pieces: Sequence[Piece]) -> Measured:
         parts = [arb(piece.begin) + arb(piece.duration) * (k + arb(0.5, 0.5)) / PARTS for k in range(PARTS)]
         w = (system.inputs_over(piece.begin, piece.end)(t) for t in parts)
         mus.append(max(logarithmic_norm(metric, jacobian(system, [arb(0)] * system.n, each)) for each in w))
-        around = inputs_around(system, piece)
-        both = zip((system, switched.system), piece.around, strict=True)
+        around = inputs_around(system, piece, piece.terms)
+        both = (system, piece.near_x_lin), (switched.system, piece.near_x)
         defects.append([defect_of(each, metric, piece, p, around) for each, p in both])
     if set(which) != set(range(len(begins))):
         raise NotProvedError("a phase has no pieces")

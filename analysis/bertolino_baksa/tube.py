@@ -15,12 +15,11 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import cache, cached_property
 from itertools import pairwise
 from typing import Any
 
 import numpy as np
-from flint import arb, arb_mat, arb_series, fmpq
+from flint import arb, arb_mat, arb_series
 
 from .balls import (
     Array,
@@ -38,39 +37,13 @@ from .balls import (
     sine,
 )
 from .norms import Metric
+from .pieces import Piece, derivative, everywhere, span
 
 Excess = Callable[[Balls, Balls], arb_mat]
 Outputs = Callable[[Sequence[Any], Sequence[Any], Any, Any], Sequence[Any]]
 MIDDLE, WHOLE = arb(0.5), arb(0.5, 0.5)  # of a piece, as τ
-MORE = 4  # terms of a defect's series beyond the polynomials' degree; what is left is enclosed
+OF_OUTPUTS = 20  # terms of outputs: the remainder is about 1e-10 of them
 TRIES = 60  # of a wider tube, before a piece is given up
-
-
-@dataclass(frozen=True)
-class Piece:
-    """Coefficients (n, degree + 1) of τᵏ near x_lin and near e, τ = (t − begin)/(end − begin); times exact [s]."""
-
-    begin: fmpq
-    end: fmpq
-    linear: Array
-    error: Array
-
-    @property
-    def duration(self) -> fmpq:
-        """end − begin [s]."""
-        return self.end - self.begin
-
-    @property
-    def terms(self) -> int:
-        """Number of terms of series along the piece, MORE than its polynomials have."""
-        return self.linear.shape[1] + MORE
-
-    @cached_property
-    def around(self) -> tuple[arb_mat, arb_mat]:
-        """The polynomials near x_lin and near x by powers of σ = 2τ − 1: balls (n, terms)."""
-        moved = _to_middle(self.terms - MORE)
-        linear, error = (matrix(p) * moved for p in (self.linear, self.error))
-        return linear, linear + error
 
 
 Around = tuple[arb_mat, arb_mat]
@@ -105,8 +78,8 @@ def prove_tube(
     B = input_matrix(system)
     defects = []
     for piece in pieces:
-        w = inputs_around(system, piece)
-        defects.append((_linear_defect(metric, B, piece, w), defect_of(system, metric, piece, piece.around[1], w)))
+        w = inputs_around(system, piece, piece.terms)
+        defects.append((_linear_defect(metric, B, piece, w), defect_of(system, metric, piece, piece.near_x, w)))
     return followed(system, metric, pieces, np.array(defects), start, (*off, off[0] + off[1]))
 
 
@@ -142,7 +115,9 @@ def prove_linear(system: ExactSystem, metric: Metric, pieces: Sequence[Piece]) -
     refuse_gaps(pieces)
     for piece in pieces:
         V = up(V + jumps(metric, before, piece)[0])
-        after = grown(V, -metric.alpha, _linear_defect(metric, B, piece, inputs_around(system, piece)), piece)
+        after = grown(
+            V, -metric.alpha, _linear_defect(metric, B, piece, inputs_around(system, piece, piece.terms)), piece
+        )
         found.append(max(V, after))
         V, before = after, (piece.linear, piece.error)
     return np.array(found)
@@ -187,39 +162,9 @@ def up(x: float) -> float:
     return math.nextafter(x, math.inf)
 
 
-@cache
-def _to_middle(count: int) -> arb_mat:
-    """What takes coefficients (count,) of τᵏ to those (count + MORE,) of σᵏ: τ = (1 + σ)/2."""
-    return arb_mat([[arb(math.comb(j, k)) / 2**j for k in range(count + MORE)] for j in range(count)])
-
-
-@cache
-def _everywhere(terms: int) -> arb_mat:
-    """What takes coefficients (terms,) of σᵏ to those of (σ − s)ᵏ, at all |s| ≤ 1 at once."""
-    powers = _powers_of_span(terms)
-    rows = ([math.comb(j, k) * powers[j - k] if k <= j else arb(0) for k in range(terms)] for j in range(terms))
-    return arb_mat(list(rows))
-
-
-@cache
-def _span(terms: int) -> arb_mat:
-    """Balls (terms, 1) around σᵏ of all |σ| ≤ 1."""
-    return column(_powers_of_span(terms))
-
-
-def _powers_of_span(terms: int) -> list[Any]:
-    return [arb(1), *(arb(0, 1) if k % 2 else arb(0.5, 0.5) for k in range(1, terms))]
-
-
-@cache
-def _derivative(terms: int) -> arb_mat:
-    """What takes coefficients (terms,) of σᵏ to those of the derivative."""
-    return arb_mat([[j if j == k + 1 else 0 for k in range(terms)] for j in range(terms)])
-
-
-def inputs_around(system: ExactSystem, piece: Piece) -> Around:
+def inputs_around(system: ExactSystem, piece: Piece, terms: int) -> Around:
     """Coefficients (m, terms) of σᵏ of w, around the middle of the piece, and around all of its points at once."""
-    h, terms = arb(piece.duration), piece.terms
+    h = arb(piece.duration)
     w = system.inputs_over(piece.begin, piece.end)
     found = []
     with precision(terms):
@@ -231,29 +176,29 @@ def inputs_around(system: ExactSystem, piece: Piece) -> Around:
 
 def _linear_defect(metric: Metric, B: arb_mat, piece: Piece, w: Around) -> float:
     """sup ‖A p + B w − p'‖_S [1/s]; beyond the polynomial's degree there is only w, whose last term is a remainder."""
-    p, (at, over) = piece.around[0], w
+    p, (at, over) = piece.near_x_lin, w
     bounded = arb_mat([[*row[:-1], whole[-1]] for row, whole in zip(at.tolist(), over.tolist(), strict=True)])
     return _sup_length(metric, metric.A * p + B * bounded - _slope(piece, p))
 
 
 def defect_of(system: ExactSystem, metric: Metric, piece: Piece, p: arb_mat, w: Around) -> float:
-    """sup ‖F(p, w) − p'‖_S [1/s] of polynomials p and inputs w, as of `Piece.around` and `inputs_around`."""
-    return _sup_length(metric, _series(piece.terms, system.equations, p, w) - _slope(piece, p))
+    """sup ‖F(p, w) − p'‖_S [1/s] of polynomials p and inputs w, as of `Piece.near_x` and `inputs_around`."""
+    return _sup_length(metric, _series(system.equations, p, w) - _slope(piece, p))
 
 
 def _slope(piece: Piece, p: arb_mat) -> arb_mat:
     """p' by powers of σ [1/s]."""
-    return p * _derivative(piece.terms) * (2 / arb(piece.duration))
+    return p * derivative(piece.terms) * (2 / arb(piece.duration))
 
 
-def _series(terms: int, functions: Outputs, p: arb_mat, w: Around) -> arb_mat:
+def _series(functions: Outputs, p: arb_mat, w: Around) -> arb_mat:
     """Coefficients (k, terms) of σᵏ of functions(p, w, sin, cos): the last over the whole piece, others at σ = 0.
 
-    Around the middle, as there a remainder of order k weighs 2⁻ᵏ of what it does from an end on.
+    As many as w has. Around the middle, as there a remainder of order k weighs 2⁻ᵏ of what it does from an end on.
     """
-    found = []
+    terms, found = w[0].ncols(), []
     with precision(terms):
-        for both in zip((p, p * _everywhere(terms)), w, strict=True):
+        for both in zip((p, p * everywhere(p.ncols())), w, strict=True):
             y, u = ([arb_series(row, prec=terms) for row in m.tolist()] for m in both)
             found.append([coefficients(value, terms) for value in functions(y, u, sine, cosine)])
     return arb_mat([[*at[:-1], over[-1]] for at, over in zip(*found, strict=True)])
@@ -262,10 +207,10 @@ def _series(terms: int, functions: Outputs, p: arb_mat, w: Around) -> arb_mat:
 def enclosed_series(system: ExactSystem, piece: Piece, functions: Outputs, off: Array) -> tuple[Array, Array]:
     """Outputs along all x with |x_j − p_j| ≤ off_j: coefficients (k, terms) of (2τ − 1)ᵏ, and how far (k,) they may be
     off."""
-    p = piece.around[1].tolist()
+    p = piece.near_x.tolist()
     for row, radius in zip(p, off.tolist(), strict=True):
         row[0] += arb(0, radius)
-    rows = _series(piece.terms, functions, arb_mat(p), inputs_around(system, piece)).tolist()
+    rows = _series(functions, arb_mat(p), inputs_around(system, piece, OF_OUTPUTS)).tolist()
     centres = [[float(c.mid()) for c in row[:-1]] for row in rows]
     rest = [
         sum(above(c - arb(near)) for c, near in zip(row, nears, strict=False)) + above(row[-1])
@@ -276,7 +221,7 @@ def enclosed_series(system: ExactSystem, piece: Piece, functions: Outputs, off: 
 
 def _sup_length(metric: Metric, d: arb_mat) -> float:
     """Bound of ‖Σ d_k σᵏ‖_S over |σ| ≤ 1, row by row."""
-    return metric.longest(magnitudes(d * _span(d.ncols())).ravel())
+    return metric.longest(magnitudes(d * span(d.ncols())).ravel())
 
 
 def over(system: ExactSystem, piece: Piece) -> list[Any]:
@@ -291,7 +236,7 @@ def closed(
 
     excess : ∂F/∂x − A over the balls x and w.  rate : A's logarithmic norm.
     """
-    ranges = (piece.around[1] * _span(piece.terms)).entries()
+    ranges = (piece.near_x * span(piece.terms)).entries()
     w = over(system, piece)
     most = 2.0 * (V + defect * above(arb(piece.duration)))
     for _ in range(TRIES):

@@ -28,7 +28,6 @@ from ..methods.polynomials import Array
 from ..reference import Parameters, car_of, road_parameters
 from ..trajectory import CERTIFICATE
 from ..tyres import static_loads_of, tyre_heights
-from .car_bounded_roads import statement as every_road
 from .car_certificates import build, car_norms, certify_car, prove_reference
 from .certificate_words import model_words, named_by_content, refuse_exceeded, start_words
 from .directed import at_least, at_most
@@ -79,6 +78,8 @@ def judge_certificate(path: Path) -> int:
     certificate = opened(data, str(path), _any_kind)
     try:
         if isinstance(certificate, BoundedCertificate):
+            from .car_bounded_roads import statement as every_road
+
             lines = every_road(certificate, verify_bounded(certificate, build))
         else:
             lines = statement(certificate, verify(certificate, build))

@@ -13,8 +13,9 @@ from ..errors import InputError
 from .polynomials import Array
 from .standard_form import StandardForm
 
+WINDOW = 1024  # half steps, even: few iterations suffice, and its numbers stay in the cache
 ITERATIONS = 25  # of a window, before it is halved
-CLOSE, ROUND_OFF = 1e-10, 1e-15  # of the last change, over the sizes of e and of x
+CLOSE, ROUND_OFF = 1e-10, 1e-15  # of the last change, over the largest of e and of x
 
 
 def deviation(form: StandardForm, x_lin: Array, w: Array, start: Array, h: float) -> Array:
@@ -26,17 +27,15 @@ def deviation(form: StandardForm, x_lin: Array, w: Array, start: Array, h: float
     """
     e, flow = np.zeros_like(x_lin), expm(h * form.A)
     e[:, 0] = start
-    begin, last = 0, x_lin.shape[1] - 1
-    width = last
-    while begin < last:
+    begin, width = 0, WINDOW
+    while begin < x_lin.shape[1] - 1:
         window = slice(begin, begin + width + 1)
         found = _on_window(form, flow, x_lin[:, window], w[:, window], e[:, begin], h)
         if found is not None:
             e[:, window] = found
             begin += width
-            width = min(width, last - begin)
         elif width > 2:
-            width = 2 * (width // 4)
+            width //= 2
         else:
             raise InputError(f"the motion cannot be integrated in steps of {2.0 * h:g} s")
     return e
@@ -55,8 +54,8 @@ def _on_window(form: StandardForm, flow: Array, x_lin: Array, w: Array, start: A
             new[:, ::2] = _chained(twice, np.column_stack([start, step]))
             half = (5.0 * (flow @ first) + 8.0 * middle - back @ last) * (h / 12.0)  # of the parabola through all three
             new[:, 1::2] = flow @ new[:, :-1:2] + half
-            change, size = (np.abs(v).max(axis=1) for v in (new - e, new))
-            if np.all(change <= CLOSE * size + ROUND_OFF * np.abs(x).max(axis=1)):
+            change, size, whole = (np.abs(v).max() for v in (new - e, new, x))
+            if change <= CLOSE * size + ROUND_OFF * whole:
                 return new
             e = new
     return None
