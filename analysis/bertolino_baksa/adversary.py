@@ -67,11 +67,10 @@ def reference_error(form: StandardForm, signal: Signal, x0: Array, stop: float, 
     """Times (N,) [s], those of `motions`, and e = x − x_lin (n, N) of the motion from x0 itself, tightly integrated."""
     finer, steps = 2 * int(np.ceil(step / STEP)), list(_steps(signal, stop, step))
     times = [np.linspace(at[0], at[-1], finer * (len(at) - 1) + 1) for _, at in steps]
-    x_lin = np.split(
-        linear_response(form.A, form.B, x0, signal, np.concatenate(times)), np.cumsum([len(t) for t in times])[:-1], 1
-    )
+    x_lin = linear_response(form.A, form.B, x0, signal, np.concatenate(times))
+    by_pieces = np.split(x_lin, np.cumsum([len(t) for t in times])[:-1], axis=1)
     e = [np.zeros((len(x0), 1))]
-    for (piece, _), t, along in zip(steps, times, x_lin, strict=True):
+    for (piece, _), t, along in zip(steps, times, by_pieces, strict=True):
         e.append(deviation(form, along, piece(t), e[-1][:, -1], t[1] - t[0])[:, finer::finer])
     return np.concatenate([signal.edges[:1], *(at[1:] for _, at in steps)]), np.concatenate(e, axis=1)
 

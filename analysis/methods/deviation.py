@@ -63,7 +63,7 @@ def _on_window(form: StandardForm, flow: Array, x_lin: Array, w: Array, start: A
 
 def _chained(flow: Array, added: Array) -> Array:
     """v_k = flow v_(k−1) + added_k for all columns: sums over 2, 4, 8 … of them."""
-    v, span = added, 1
+    v, span = added.copy(), 1
     while span < v.shape[1]:
         v[:, span:] += flow @ v[:, :-span]
         flow, span = flow @ flow, 2 * span
