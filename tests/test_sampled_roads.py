@@ -19,10 +19,12 @@ from analysis.__main__ import main
 from analysis.bertolino_baksa import convolution as convolutions
 from analysis.bertolino_baksa.adversary import stepped
 from analysis.bertolino_baksa.balls import ExactSystem, NotProvedError, precision
+from analysis.bertolino_baksa.cells import decay
 from analysis.bertolino_baksa.certificate import opened
 from analysis.bertolino_baksa.input_rows import InputRows, RowClass, looseness, windows
 from analysis.bertolino_baksa.majorant import majorant
 from analysis.bertolino_baksa.norms import Norm, euclid, modal_metric, weighted_sup
+from analysis.bertolino_baksa.pieces import Piece
 from analysis.bertolino_baksa.proof import Proof
 from analysis.bertolino_baksa.rows_adversary import _signs, _steps, beside, reached
 from analysis.bertolino_baksa.rows_certificate import RowsCertificate, certificate_of, certify, to_json, verify
@@ -126,16 +128,19 @@ def test_a_change_near_a_point_is_bounded_and_closely(equations: Equations) -> N
 def test_a_convolution_is_a_bound_and_close(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """Of forcings by chance on the cells, by windows much wider than these too; and of 1 with the worst signs."""
     _, proof, form = certificate_of_textbook(name, CLASSES[0])
-    n, ends = len(form.A), np.concatenate([[0.0], np.cumsum(proof.decay.width)])
+    n, metric = len(form.A), proof.metric
+    none = np.zeros((n, 2))
+    flow = decay(metric, tuple(Piece(fmpq(k, 100), fmpq(k + 1, 100), none, none) for k in range(60)))
+    ends = np.concatenate([[0.0], np.cumsum(flow.width)])
     f = np.random.default_rng(2).uniform(0.0, 1.0, (len(ends) - 1, n))
     for count, width in ((1, 0.25), (1000, 0.002)):
         monkeypatch.setattr(convolutions, "LEAST", count)
         monkeypatch.setattr(convolutions, "WIDTH", width)
-        along = convolutions.convolution(proof.decay, np.eye(n))
+        along = convolutions.convolution(flow, np.eye(n))
         for cell in range(len(f) - 3):  # one push, near the end of its window or not, and what it leaves
             found = along.by_cells(along(f * (np.arange(len(f)) == cell)[:, None]))
             later = float(ends[cell + 3] - (ends[cell] + ends[cell + 1]) / 2.0)
-            exact = np.abs(expm(form.A * later)) @ f[cell] * proof.decay.width[cell]
+            exact = np.abs(expm(form.A * later)) @ f[cell] * flow.width[cell]
             assert (exact <= found[cell + 2] * 1.01).all()
         found = along.by_cells(along(np.ones_like(f)))
         for cell in range(5, len(f), 17):

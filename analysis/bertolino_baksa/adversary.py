@@ -10,8 +10,8 @@ from collections.abc import Callable, Iterator, Sequence
 import numpy as np
 from scipy.linalg import expm
 
+from ..methods.deviation import deviation
 from ..methods.linear_response import linear_response
-from ..methods.nonlinear_response import nonlinear_response
 from ..methods.signals import Piece, Signal
 from ..methods.standard_form import StandardForm
 from .balls import Array
@@ -19,7 +19,6 @@ from .norms import Norm
 
 STEP = 5e-4  # s, at most
 LAST, LAST_OF_ENDLESS = 3.0, 8.0  # times 1/α after the last corner
-TIGHT = 1e-11  # of the motion from x0 itself
 CANDIDATES = 64  # starts that the linear part proposes
 SPREAD = 8  # times as many are in the running: the best have neighbours nearly as good
 FEW = 12  # of them for a picture
@@ -66,9 +65,14 @@ def _steps(signal: Signal, stop: float, step: float) -> Iterator[tuple[Piece, Ar
 
 def reference_error(form: StandardForm, signal: Signal, x0: Array, stop: float, step: float) -> tuple[Array, Array]:
     """Times (N,) [s], those of `motions`, and e = x − x_lin (n, N) of the motion from x0 itself, tightly integrated."""
-    times = np.concatenate([[signal.edges[0]], *(times[1:] for _, times in _steps(signal, stop, step))])
-    x = nonlinear_response(form, x0, signal, times, rtol=TIGHT)
-    return times, x - linear_response(form.A, form.B, x0, signal, times)
+    finer, steps = 2 * int(np.ceil(step / STEP)), list(_steps(signal, stop, step))
+    times = [np.linspace(at[0], at[-1], finer * (len(at) - 1) + 1) for _, at in steps]
+    x_lin = linear_response(form.A, form.B, x0, signal, np.concatenate(times))
+    by_pieces = np.split(x_lin, np.cumsum([len(t) for t in times])[:-1], axis=1)
+    e = [np.zeros((len(x0), 1))]
+    for (piece, _), t, along in zip(steps, times, by_pieces, strict=True):
+        e.append(deviation(form, along, piece(t), e[-1][:, -1], t[1] - t[0])[:, finer::finer])
+    return np.concatenate([signal.edges[:1], *(at[1:] for _, at in steps)]), np.concatenate(e, axis=1)
 
 
 def _offsets(

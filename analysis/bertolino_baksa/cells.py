@@ -8,13 +8,15 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 from flint import arb, arb_mat
 
 from .balls import Array, ExactSystem, above, magnitudes, matrix, rounded, two_norm
 from .norms import Metric, Norm
-from .tube import Outputs, Piece, Tube, enclosed_series
+from .pieces import Piece
+from .tube import Outputs, Tube, enclosed_series
 
 CELLS, LATE_CELLS = 12, 3  # per piece, for e^(At) and the growth of perturbations: at first, and from
 LATE = 2.0  # times the slowest time constant on, when what oscillates fast has died out
@@ -186,11 +188,18 @@ def largest_of_parts(values: Array) -> Array:
 
 def errors(tube: Tube, metric: Metric, norm: Norm) -> Array:
     """sup N(e) over each of the cells of `decay`, from finer ones in it."""
+    if norm.largest:
+        return np.asarray(errors_by_rows(tube, metric, norm).max(axis=1))
     found, c = [], metric.of(norm)
     for values, bend, V in finely(tube, metric, norm):
-        sizes = np.abs(values).max(axis=1) if norm.largest else np.sqrt((values**2).sum(axis=1))
-        curved = bend.max() if norm.largest else np.sqrt((bend**2).sum())
-        found.append(sizes.max(axis=1) + curved + c * V)
+        found.append(np.sqrt((values**2).sum(axis=1).max(axis=1)) + np.sqrt((bend**2).sum()) + c * V)
+    return np.concatenate(found) * (1 + EPS)
+
+
+def errors_by_rows(tube: Tube, metric: Metric, norm: Norm) -> Array:
+    """sup |(T e)_i| (N, n) over each of the cells of `decay`, from finer ones in it."""
+    c = metric.rows(norm.T)
+    found = [np.abs(values).max(axis=2) + bend + c * V for values, bend, V in finely(tube, metric, norm)]
     return np.concatenate(found) * (1 + EPS)
 
 
@@ -211,10 +220,17 @@ def sampled(coefficients: Array, cells: int, sizes: Array | None = None, begin: 
     sizes : of the coefficients before they were combined, for the rounding of the combination.
     """
     k = np.arange(coefficients.shape[1])
-    powers = np.linspace(begin, 1.0, cells + 1)[None, :] ** k[:, None]
     sizes = np.abs(coefficients) if sizes is None else sizes
     second = (sizes * k * (k - 1)).sum(axis=1)
-    return coefficients @ powers, second * (1.0 - begin) ** 2 / (8.0 * cells**2) + EPS * sizes.sum(axis=1)
+    return coefficients @ _powers(len(k), cells, begin), second * (1.0 - begin) ** 2 / (
+        8.0 * cells**2
+    ) + EPS * sizes.sum(axis=1)
+
+
+@cache
+def _powers(count: int, cells: int, begin: float) -> Array:
+    """Powers (count, cells + 1) of the ends of cells that divide what lies between `begin` and 1; not to be written."""
+    return np.asarray(np.linspace(begin, 1.0, cells + 1)[None, :] ** np.arange(count)[:, None])
 
 
 def errors_of_states(tube: Tube, metric: Metric) -> Array:
@@ -226,11 +242,20 @@ def errors_of_states(tube: Tube, metric: Metric) -> Array:
     return np.max(found, axis=0) * (1 + EPS)
 
 
-def outputs(system: ExactSystem, tube: Tube, metric: Metric, functions: Outputs) -> tuple[Array, Array]:
-    """Smallest and largest value (k,) of the outputs functions(x, w, sin, cos) along x, over all pieces."""
-    low, high = [], []
-    for piece, V in zip(tube.pieces, tube.full, strict=True):
-        centres, rest = enclosed_series(system, piece, functions, metric.reach * V)
+def outputs(
+    system: ExactSystem, tube: Tube, metric: Metric, functions: Outputs, wider: Array | None = None
+) -> tuple[Array, Array]:
+    """Smallest and largest value (k,) of the outputs functions(x, w, sin, cos) along x, over all pieces.
+
+    wider : (N, n + m), how far x and w may be off besides, over the cells of `decay`.
+    """
+    low, high, cell = [], [], 0
+    for piece, count, V in zip(tube.pieces, counts(tube.pieces, metric), tube.full, strict=True):
+        off = np.pad(metric.reach * V, (0, system.m))
+        if wider is not None:
+            off += wider[cell : cell + count].max(axis=0)
+            cell += count
+        centres, rest = enclosed_series(system, piece, functions, off * (1 + EPS))
         values, bend = sampled(centres, FINE, begin=-1.0)
         low.append((values - bend[:, None]).min(axis=1) - rest)
         high.append((values + bend[:, None]).max(axis=1) + rest)

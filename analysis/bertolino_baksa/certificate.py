@@ -21,9 +21,9 @@ from ..errors import InputError
 from . import strict
 from .balls import Array, ExactSystem, NotProvedError, precision
 from .norms import Norm, proved_metric
+from .pieces import Piece
 from .proof import Proof, prove
 from .taylor import find_pieces
-from .tube import Piece
 
 FORMAT = 1
 ROWS = 24  # of a table δ(ε)

@@ -31,11 +31,11 @@ def perturbed(
     """
     n, S = len(metric.S), np.abs(metric.S)
     v, largest = np.array(v0, dtype=float), np.full((len(X), len(v0)), np.inf)
-    at_X = bound(X.T).T
+    at_X = bound(X.T)
     reach = np.concatenate([metric.reach, np.zeros(X.shape[1] - n)])[:, None]
 
     def forcing(cell: int, size: Array) -> Array:
-        change = bound.change(X[cell], at_X[cell], spread[cell] + reach * size)
+        change = bound.change(X[cell][:, None], at_X[:, cell : cell + 1], spread[cell] + reach * size)
         return np.sqrt(((S @ change) ** 2).sum(axis=0)) * (1.0 + 1e-12)
 
     pushed = np.zeros(len(v0))

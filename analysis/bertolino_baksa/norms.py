@@ -53,21 +53,29 @@ class Metric:
         """n_j ≥ |x_j|/‖x‖_S (n,)."""
         return np.sqrt((magnitudes(self.inverse) ** 2).sum(axis=1)) * (1.0 + 1e-14)
 
+    @cached_property
+    def balls(self) -> arb_mat:
+        """S, exactly."""
+        return matrix(self.S)
+
+    def rows(self, T: Array) -> Array:
+        """c_i ≥ |(T x)_i|/‖x‖_S (p,); T (p, n) exact."""
+        return np.sqrt((magnitudes(matrix(T) * self.inverse) ** 2).sum(axis=1)) * (1.0 + 1e-14)
+
     def of(self, norm: Norm) -> float:
         """c ≥ N(x)/‖x‖_S."""
-        product = matrix(norm.T) * self.inverse
         if norm.largest:
-            return float(np.sqrt((magnitudes(product) ** 2).sum(axis=1)).max() * (1.0 + 1e-14))
-        centre, radius = rounded(product)
+            return float(self.rows(norm.T).max())
+        centre, radius = rounded(matrix(norm.T) * self.inverse)
         return float(two_norm(centre)) + radius
 
     def size(self, m: arb_mat) -> float:
         """Bound of ‖m‖_S as an operator, by Frobenius."""
-        return length((matrix(self.S) * m * self.inverse).entries())
+        return length((self.balls * m * self.inverse).entries())
 
     def length(self, x: arb_mat) -> float:
         """Bound of ‖x‖_S of a column of balls."""
-        return length((matrix(self.S) * x).entries())
+        return length((self.balls * x).entries())
 
     def longest(self, bounds: Array) -> float:
         """Bound of ‖x‖_S for |x_j| ≤ bounds_j (n,)."""

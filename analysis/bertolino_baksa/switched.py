@@ -20,7 +20,6 @@ from .balls import (
     ExactSystem,
     NotProvedError,
     below,
-    column,
     jacobian,
     length,
     matrix,
@@ -31,7 +30,7 @@ from .balls import (
 from .cells import errors
 from .norms import Metric, Norm, proved_metric, usable_inverse
 from .proof import at_rest
-from .tube import Excess, Piece, Tube, both, closed, defect_of, exact, grown, jumps, refuse_gaps, up
+from .tube import Excess, Piece, Tube, at_end, closed, defect_of, grown, inputs_around, jumps, refuse_gaps, up
 
 PARTS = 4  # of a piece, over each of which A(t) is enclosed
 Equations = Callable[..., Sequence[Any]]
@@ -82,8 +81,8 @@ class Measured:
         last = self.switched.phases[-1].metric
         end = found[-1].pieces[-1]
         _, V, V_e = found[-1].at_end
-        x = last.length(column([sum(row, arb(0)) for row in both(end)])) + V
-        e = last.length(column([sum(row, arb(0)) for row in exact(end.error)])) + V_e
+        x = last.length(at_end(end.linear) + at_end(end.error)) + V
+        e = last.length(at_end(end.error)) + V_e
         later = last.of(norm) * at_rest(self.switched.system, last, x * (1.0 + 1e-12), e * (1.0 + 1e-12), 0.0)
         if not later < np.inf:
             raise NotProvedError("at the end of the last piece the motion is still too large to be proved to die out")
@@ -159,8 +158,9 @@ def measured(switched: Switched, pieces: Sequence[Piece]) -> Measured:
         parts = [arb(piece.begin) + arb(piece.duration) * (k + arb(0.5, 0.5)) / PARTS for k in range(PARTS)]
         w = (system.inputs_over(piece.begin, piece.end)(t) for t in parts)
         mus.append(max(logarithmic_norm(metric, jacobian(system, [arb(0)] * system.n, each)) for each in w))
-        linear = defect_of(system, metric, piece, exact(piece.linear))
-        defects.append((linear, defect_of(switched.system, metric, piece, both(piece))))
+        around = inputs_around(system, piece, piece.terms)
+        both = (system, piece.near_x_lin), (switched.system, piece.near_x)
+        defects.append([defect_of(each, metric, piece, p, around) for each, p in both])
     if set(which) != set(range(len(begins))):
         raise NotProvedError("a phase has no pieces")
     return Measured(switched, tuple(pieces), tuple(which), np.array(defects), np.array(mus))

@@ -13,9 +13,10 @@ from fmu_src.quantities import STATES
 
 from ..bertolino_baksa.balls import NotProvedError, precision
 from ..bertolino_baksa.bounded_certificate import BoundedCertificate, certify, smallest, to_json
-from ..bertolino_baksa.bounded_inputs import Bounds, Driven, Gains, gains, reached, worst_inputs
+from ..bertolino_baksa.bounded_inputs import Bounds, Driven, Gains, gains
 from ..bertolino_baksa.norms import proved_metric
 from ..bertolino_baksa.search import CLOSE, largest
+from ..bertolino_baksa.worst_inputs import reached, worst_inputs
 from ..car import car_form
 from ..errors import InputError
 from ..files import write_whole

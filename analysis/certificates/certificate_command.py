@@ -22,16 +22,13 @@ from ..bertolino_baksa.rows_certificate import RowsCertificate
 from ..bertolino_baksa.search import largest
 from ..bertolino_baksa.tube import Tube
 from ..car import car_form, road_signal
-from ..energy import tyre_heights
 from ..errors import InputError
 from ..files import write_whole
 from ..methods.polynomials import Array
 from ..reference import Parameters, car_of, road_parameters
 from ..trajectory import CERTIFICATE
-from ..tyres import static_loads_of
-from .car_bounded_roads import statement as every_road
+from ..tyres import static_loads_of, tyre_heights
 from .car_certificates import build, car_norms, certify_car, prove_reference
-from .car_sampled_roads import statement as sampled_roads
 from .certificate_words import model_words, named_by_content, refuse_exceeded, start_words
 from .directed import at_least, at_most
 from .exact_car import exact_car
@@ -102,8 +99,12 @@ def _any_kind(content: dict[str, Any]) -> Certificate | BoundedCertificate | Row
 
 def _proved_anew(certificate: Certificate | BoundedCertificate | RowsCertificate) -> list[str]:
     if isinstance(certificate, BoundedCertificate):
+        from .car_bounded_roads import statement as every_road
+
         return every_road(certificate, bounded_certificate.verify(certificate, build))
     if isinstance(certificate, RowsCertificate):
+        from .car_sampled_roads import statement as sampled_roads
+
         return sampled_roads(certificate, rows_certificate.verify(certificate, build))
     return statement(certificate, verify(certificate, build))
 
