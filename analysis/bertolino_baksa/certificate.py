@@ -12,7 +12,7 @@ import json
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any, TypeVar
+from typing import Any, Protocol, TypeVar
 
 import numpy as np
 from flint import fmpq
@@ -98,7 +98,7 @@ def certify(
             floors = [(norm, float(proof.epsilon(norm, np.zeros(1))[0])) for norm in norms(x_lin)]
             if all(proof.settled(norm, floor) for norm, floor in floors):
                 break
-        claims = tuple(_claim(proof, norm, floor, float(norm(x_lin).max())) for norm, floor in floors)
+        claims = tuple(claim_of(proof, norm, floor, float(norm(x_lin).max())) for norm, floor in floors)
     return Certificate(model, x0, S, pieces, claims), proof
 
 
@@ -107,7 +107,17 @@ def values(coefficients: Array, points: int = 9) -> Array:
     return coefficients @ np.linspace(0.0, 1.0, points) ** np.arange(coefficients.shape[1])[:, None]
 
 
-def _claim(proof: Proof, norm: Norm, floor: float, scale: float) -> Claim:
+class Proved(Protocol):
+    """What a table of δ(ε) is made from; see `Proof`."""
+
+    def epsilon(self, norm: Norm, delta: Array) -> Array: ...
+
+    def bounded(self, norm: Norm, delta: float) -> bool: ...
+
+    def carried(self, norm: Norm) -> float: ...
+
+
+def claim_of(proof: Proved, norm: Norm, floor: float, scale: float) -> Claim:
     """The table with the largest δ that is found; its smallest δ raises the floor by but FIRST of it.
 
     floor : what is proved of δ = 0.
@@ -117,7 +127,7 @@ def _claim(proof: Proof, norm: Norm, floor: float, scale: float) -> Claim:
     floor = max(floor, FLOOR * scale)
     if not floor < np.inf:
         raise NotProvedError(f"no bound for all t in the {norm.name} norm")
-    first = FIRST * floor / float(proof.decay.of(norm).max())
+    first = FIRST * floor / proof.carried(norm)
     top = _largest(proof, norm, first)
     while True:  # once more: all together
         delta = np.geomspace(first, top, ROWS) * (1.0 - MARGIN)
@@ -130,7 +140,7 @@ def _claim(proof: Proof, norm: Norm, floor: float, scale: float) -> Claim:
     return Claim(norm, np.stack([np.maximum.accumulate(epsilon) * (1.0 + MARGIN), delta], axis=1))
 
 
-def _largest(proof: Proof, norm: Norm, first: float) -> float:
+def _largest(proof: Proved, norm: Norm, first: float) -> float:
     """A δ ≥ first that is proved, while one at most 1/CLOSE times as large is not (or is above HUGE): by halving."""
     if not proof.bounded(norm, first):
         raise NotProvedError(f"no delta > 0 in the {norm.name} norm")
@@ -173,10 +183,7 @@ def to_json(certificate: Certificate) -> bytes:
             "x0": certificate.x0.tolist(),
             "metric": certificate.S.tolist(),
             "claims": claims_json(certificate.claims),
-            "pieces": [
-                {"begin": str(p.begin), "end": str(p.end), "x_lin": p.linear.tolist(), "e": p.error.tolist()}
-                for p in certificate.pieces
-            ],
+            "pieces": pieces_json(certificate.pieces),
         }
     )
 
@@ -195,6 +202,13 @@ def claims_json(claims: Sequence[Claim]) -> list[dict[str, Any]]:
             "delta of eps": [{"eps": e, "delta": d} for e, d in c.table.tolist()],
         }
         for c in claims
+    ]
+
+
+def pieces_json(pieces: Sequence[Piece]) -> list[dict[str, Any]]:
+    """Pieces as plain data."""
+    return [
+        {"begin": str(p.begin), "end": str(p.end), "x_lin": p.linear.tolist(), "e": p.error.tolist()} for p in pieces
     ]
 
 
@@ -230,9 +244,14 @@ def certificate_of(content: dict[str, Any]) -> Certificate:
     strict.of_keys(content, ("format", "theorem", "model", "x0", "metric", "claims", "pieces"))
     strict.theorem(content["theorem"], THEOREM)
     x0 = strict.numbers(content["x0"], 1)
-    n = len(x0)
+    S, model, claims = system_of(content, len(x0))
+    return Certificate(model, x0, S, pieces_of(content["pieces"], len(x0)), claims)
+
+
+def pieces_of(content: Any, n: int) -> tuple[Piece, ...]:
+    """Pieces of n states from plain data; raises ValueError where they cannot be."""
     pieces = []
-    for p in content["pieces"]:
+    for p in content:
         strict.of_keys(p, ("begin", "end", "x_lin", "e"))
         linear, error = strict.numbers(p["x_lin"], 2), strict.numbers(p["e"], 2)
         if not (linear.shape == error.shape and len(linear) == n and 2 <= linear.shape[1] <= 100):
@@ -241,26 +260,44 @@ def certificate_of(content: dict[str, Any]) -> Certificate:
         if not end > begin:
             raise ValueError(f"a piece runs from {begin} to {end}")
         pieces.append(Piece(begin, end, linear, error))
-    S, model, claims = system_of(content, n)
     if not pieces:
         raise ValueError("wanted pieces")
-    return Certificate(model, x0, S, tuple(pieces), claims)
+    return tuple(pieces)
 
 
 def system_of(content: dict[str, Any], n: int) -> tuple[Array, dict[str, Any], tuple[Claim, ...]]:
     """Metric, model and claims of n states from plain data; raises ValueError where they cannot be."""
+    return square(content["metric"], n), model_in(content), claims_of(content["claims"], n)
+
+
+def square(content: Any, n: int) -> Array:
+    """A matrix of n states from plain data; raises ValueError for any other."""
+    found = strict.numbers(content, 2)
+    if found.shape != (n, n):
+        raise ValueError(f"wanted a matrix of {n} states, got the shape {found.shape}")
+    return found
+
+
+def model_in(content: dict[str, Any]) -> dict[str, Any]:
+    """The model; raises ValueError if it is no object."""
+    model = content["model"]
+    if not isinstance(model, dict):
+        raise ValueError("wanted a model")
+    return model
+
+
+def claims_of(content: Any, n: int) -> tuple[Claim, ...]:
+    """Claims of n states from plain data, one at least; raises ValueError where they cannot be."""
     claims = []
-    for c in content["claims"]:
+    for c in content:
         norm = strict.of_keys(strict.of_keys(c, ("norm", "l", "delta of eps"))["norm"], ("name", "largest", "T"))
         rows = [strict.of_keys(row, ("eps", "delta")) for row in c["delta of eps"]]
         table, floor = strict.numbers([[row["eps"], row["delta"]] for row in rows], 2), strict.numbers(c["l"], 0)
         if not (np.all(np.diff(table, axis=0) >= 0.0) and table[0, 1] > 0.0 and table[0, 0] == floor):
             raise ValueError("delta(eps) must rise, from l and a delta > 0 on")
-        T = strict.numbers(norm["T"], 2)
-        if T.shape != (n, n):
-            raise ValueError(f"a norm has the shape {T.shape}")
-        claims.append(Claim(Norm(strict.text(norm["name"]), T, strict.truth(norm["largest"])), table))
-    S = strict.numbers(content["metric"], 2)
-    if S.shape != (n, n) or not claims or not isinstance(content["model"], dict):
-        raise ValueError("wanted a metric of the states, claims and a model")
-    return S, content["model"], tuple(claims)
+        claims.append(
+            Claim(Norm(strict.text(norm["name"]), square(norm["T"], n), strict.truth(norm["largest"])), table)
+        )
+    if not claims:
+        raise ValueError("wanted claims")
+    return tuple(claims)

@@ -3,37 +3,39 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from fmu_src.quantities import CORNER_WORDS, PARAMETERS, STATES
+from fmu_src.quantities import PARAMETERS
 
 from ..bertolino_baksa.adversary import long_enough, reference_floor
-from ..bertolino_baksa.balls import NotProvedError, precision
-from ..bertolino_baksa.bounded_certificate import KIND, BoundedCertificate
+from ..bertolino_baksa.balls import NotProvedError
+from ..bertolino_baksa.bounded_certificate import KIND as BOUNDED
+from ..bertolino_baksa.bounded_certificate import BoundedCertificate
 from ..bertolino_baksa.bounded_certificate import certificate_of as bounded_of
 from ..bertolino_baksa.bounded_certificate import verify as verify_bounded
-from ..bertolino_baksa.cells import errors_of_states, outputs
 from ..bertolino_baksa.certificate import Certificate, certificate_of, opened, to_json, verify
 from ..bertolino_baksa.proof import Proof
 from ..bertolino_baksa.search import largest
-from ..bertolino_baksa.tube import Tube
+from ..bertolino_baksa.switched_certificate import KIND as SWITCHED
+from ..bertolino_baksa.switched_certificate import SwitchedCertificate
+from ..bertolino_baksa.switched_certificate import certificate_of as switched_of
+from ..bertolino_baksa.switched_certificate import verify as verify_switched
 from ..car import car_form, road_signal
-from ..energy import tyre_heights
 from ..errors import InputError
 from ..files import write_whole
-from ..methods.polynomials import Array
 from ..reference import Parameters, car_of, road_parameters
 from ..trajectory import CERTIFICATE
-from ..tyres import static_loads_of
 from .car_bounded_roads import statement as every_road
 from .car_certificates import build, car_norms, certify_car, prove_reference
-from .certificate_words import model_words, named_by_content, refuse_exceeded, start_words
-from .directed import at_least, at_most
-from .exact_car import exact_car
+from .certificate_words import model_words, named_by_content, start_words
+from .directed import at_least
+from .finite_horizon import build as build_by_time
+from .horizon_words import statement as by_time
+from .motion_words import along, claim_words
 
 CLOSE = 1.02  # ratio at which the bisection for the largest amplitude stops
 
@@ -81,6 +83,8 @@ def judge_certificate(path: Path) -> int:
     try:
         if isinstance(certificate, BoundedCertificate):
             lines = every_road(certificate, verify_bounded(certificate, build))
+        elif isinstance(certificate, SwitchedCertificate):
+            lines = by_time(certificate, verify_switched(certificate, build_by_time))
         else:
             lines = statement(certificate, verify(certificate, build))
     except NotProvedError as error:
@@ -92,8 +96,13 @@ def judge_certificate(path: Path) -> int:
     return 0
 
 
-def _any_kind(content: dict[str, Any]) -> Certificate | BoundedCertificate:
-    return bounded_of(content) if content.get("kind") == KIND else certificate_of(content)
+def _any_kind(content: dict[str, Any]) -> Certificate | BoundedCertificate | SwitchedCertificate:
+    others: dict[Any, Callable[[dict[str, Any]], BoundedCertificate | SwitchedCertificate]] = {
+        BOUNDED: bounded_of,
+        SWITCHED: switched_of,
+    }
+    kind = content.get("kind")
+    return others[kind](content) if kind in (BOUNDED, SWITCHED) else certificate_of(content)
 
 
 def statement(certificate: Certificate, proof: Proof) -> list[str]:
@@ -108,57 +117,15 @@ def statement(certificate: Certificate, proof: Proof) -> list[str]:
     stop = min(float(certificate.pieces[-1].end), long_enough(form, signal))
     true = reference_floor(form, signal, [c.norm for c in claims], certificate.x0, stop)
     start = start_words(certificate.x0)
-    lines = [f"x_lin {start} is almost stable (definition 2.1): for all t >= 0 and every eps >= l,"]
-    for claim, floor in zip(claims, true.tolist(), strict=True):
-        epsilon, delta = claim.table[-1].tolist()
-        refuse_exceeded(claim, floor)
-        beside = f"a reference motion reaches {floor:.6g}" + (f": ratio {claim.floor / floor:.4f}" if floor else "")
-        lines.append(
-            f"  {claim.norm.name} norm: l <= {at_most(claim.floor, 6)} ({beside}); "
-            f"delta up to {at_least(delta)}, at eps = {at_most(epsilon)}"
-        )
-    ends = "x -> 0 after the road's end" if proof.repetition is None else "every period's tube returns into itself"
-    return [*lines, *model_words(model), f"  {ends}", *_along(model["parameters"], proof, start)]
-
-
-def _along(parameters: Parameters, proof: Proof, start: str) -> list[str]:
-    """Of the motion from x0 alone, for how long: |x − x_lin|, and whether the springs of its tyres only push.
-
-    With its later periods where the road repeats itself; the tail of a road that ends is left out.
-    """
-    tubes = [proof.tube, *([proof.repetition.window] if proof.repetition else [])]
-    until = "for all t >= 0" if proof.repetition else f"until t = {float(proof.tube.pieces[-1].end):g} s"
-    bounds = np.max([errors_of_states(tube, proof.metric) for tube in tubes], axis=0)
-    named = ", ".join(f"{q.name} {at_most(b, 3)} {q.unit}" for q, b in zip(STATES[:7], bounds.tolist(), strict=False))
-    low = np.min([_loads(parameters, proof, tube) for tube in tubes], axis=0)
-    worst = int(np.argmin(low))
-    load = f"each tyre's load is at least {at_least(low[worst])} N ({CORNER_WORDS[worst]})"
-    contact = (
-        "so that it stays on the ground; of other starts within delta this is not said"
-        if low[worst] > 0.0
-        else "so that contact is not proved: where a load is negative the certificate speaks of springs that pull"
-    )
+    again = proof.repetition
+    tubes = [(tube, proof.metric) for tube in (proof.tube, *([again.window] if again else []))]
+    until = "for all t >= 0" if again else f"until t = {float(proof.tube.pieces[-1].end):g} s"
     return [
-        f"  of the motion {start} itself, {until}:",
-        f"    |x - x_lin| at most {named}",
-        f"    {load}, {contact}",
+        *claim_words(claims, true, start),
+        *model_words(model),
+        "  every period's tube returns into itself" if again else "  x -> 0 after the road's end",
+        *along(model["parameters"], proof.system, tubes, f"{start} itself, {until}"),
     ]
-
-
-def _loads(parameters: Parameters, proof: Proof, tube: Tube) -> Array:
-    """Smallest loads (4,) [N] of the tyres in a tube."""
-    car = exact_car(car_of(parameters))
-    cp, bp = (car.cp1, car.cp1, car.cp2, car.cp2), (car.bp1, car.bp1, car.bp2, car.bp2)
-
-    def forces(x: Sequence[Any], w: Sequence[Any], sin: Any, cos: Any) -> list[Any]:
-        heights, rates = tyre_heights(car, x[:7], x[7:], sin, cos)
-        return [
-            c * (h - height) + b * (dh - rate)
-            for c, b, h, dh, height, rate in zip(cp, bp, w[:4], w[4:], heights, rates, strict=True)
-        ]
-
-    with precision(2):
-        return outputs(proof.system, tube, proof.metric, forces)[0] + static_loads_of(car_of(parameters))
 
 
 def largest_amplitude(parameters: Parameters) -> float:
