@@ -6,6 +6,7 @@ import json
 import random
 from collections.abc import Sequence
 from functools import cache
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -13,7 +14,9 @@ import pytest
 from flint import arb, arb_mat, fmpq
 from motions_by_time import Motions
 from test_almost_stable import rehashed
+from test_certificates import certified
 
+from analysis.__main__ import main
 from analysis.bertolino_baksa.balls import Array, ExactSystem, NotProvedError, precision
 from analysis.bertolino_baksa.certificate import opened
 from analysis.bertolino_baksa.norms import euclid, weighted_sup
@@ -28,6 +31,7 @@ from analysis.bertolino_baksa.switched_certificate import (
 from analysis.bertolino_baksa.taylor import find_pieces
 from analysis.bertolino_baksa.transition import matrices
 from analysis.car import actuators, car_form, road_signal
+from analysis.certificates import certificate_command, closed_loop_certificate
 from analysis.certificates.car_certificates import car_norms, certify_car
 from analysis.certificates.closed_loop_certificate import infinite_gain
 from analysis.certificates.finite_horizon import build, certify_horizon, certify_table, parts
@@ -290,6 +294,21 @@ def test_a_constant_table_says_what_the_certificate_of_a_constant_gain_says() ->
     delta = np.array([0.0, 1e-3, 0.1, 1.0, 6.0])
     with precision(2):
         np.testing.assert_allclose(proof.epsilon(energy, delta), closed.epsilon(energy, delta), rtol=2e-3)
+
+
+def test_the_command_writes_a_file_of_its_own_and_verify_knows_it(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(closed_loop_certificate, "both", lambda parameters: (certified(0.01), certified(0.01)))
+    monkeypatch.setattr(closed_loop_certificate, "certify_horizon", lambda parameters, norms: made())
+    monkeypatch.setattr(certificate_command, "verify_switched", lambda certificate, build: made()[1])
+    where = tmp_path / "c.json"
+    assert main(["certify", "bump-lqr", "--closed-loop", "-o", str(where)]) == 0
+    said = capsys.readouterr().out
+    assert "energy norm: l times 1; largest delta times 1.04" in said and "c.horizon.json: written" in said
+    assert (tmp_path / "c.horizon.json").read_bytes() == to_json(made()[0])
+    assert main(["verify", str(tmp_path / "c.horizon.json")]) == 0
+    assert "c.horizon.json: every claim is proved" in capsys.readouterr().out
 
 
 @pytest.mark.parametrize(

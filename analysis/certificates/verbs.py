@@ -20,7 +20,11 @@ def add_verbs(verbs: Any, scenario: str) -> None:
     kind = verb.add_mutually_exclusive_group()
     kind.add_argument("--quick", action="store_true", help="a coarse floor in about a second, by comparison")
     kind.add_argument("--largest", action="store_true", help="also search the largest amplitude that can be certified")
-    kind.add_argument("--closed-loop", action="store_true", help="under control for ever, and against no control")
+    kind.add_argument(
+        "--closed-loop",
+        action="store_true",
+        help="under control for ever, and by time on its horizon (CERT.horizon.json), against no control",
+    )
     kind.add_argument("--bounded", type=float, metavar="A", help="every road with |h| <= A [m] instead, around rest")
     verb.add_argument("--slope", type=float, metavar="V", help="with --bounded: roads with |dh/dt| <= V [m/s] too")
     verb.set_defaults(do=_certify)
