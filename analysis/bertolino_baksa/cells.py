@@ -27,7 +27,8 @@ EPS = 1e-13  # relative: covers the roundings of a polynomial's or a product's v
 
 @dataclass(frozen=True, slots=True)
 class Decay:
-    """e^(At) over the cells: width [s] (N,), ends (N + 1, n, n), and `curve` (N, n, n) ≥ sup |A² e^(At)| Δ²/8."""
+    """Φ over the cells, e^(At) for a constant A: width [s] (N,), ends (N + 1, n, n), and `curve` (N, n, n) ≥
+    sup |Φ''| Δ²/8."""
 
     width: Array
     ends: Array
@@ -99,12 +100,18 @@ class Decay:
 
 
 def decay(metric: Metric, pieces: tuple[Piece, ...]) -> Decay:
-    """e^(At) over the cells of the pieces, from the first piece's begin.
+    """e^(At) over the cells of the pieces, from the first piece's begin."""
+    return carried_on(metric, pieces, matrix(np.eye(len(metric.S))), 0.0)[0]
+
+
+def carried_on(metric: Metric, pieces: Sequence[Piece], start: arb_mat, dropped: float) -> tuple[Decay, arb_mat, float]:
+    """e^(At) Φ over the cells of the pieces, for a Φ within `dropped` [‖S ·‖, Frobenius] of `start`, exact; the last of
+    it, exact, and how far that is off.
 
     From piece to piece without the radii of the balls, which would grow: what they hold, e^(At) only shrinks in ‖·‖_S.
     """
-    A = metric.A
-    now, ends, off, dropped = matrix(np.eye(A.nrows())), [np.eye(A.nrows())], 0.0, 0.0
+    A, now, off = metric.A, start, 0.0
+    ends = [rounded(start)[0]]
     S_size = float(np.linalg.norm(metric.S)) * (1 + EPS)
     steps: dict[tuple[int, int], arb_mat] = {}  # e^(AΔ) by Δ's numerator and denominator
     for p, count in zip(pieces, counts(pieces, metric), strict=True):
@@ -119,7 +126,7 @@ def decay(metric: Metric, pieces: tuple[Piece, ...]) -> Decay:
             off = max(off, rest)
         dropped += S_size * above(sum((v.rad() for v in now.entries()), arb(0)))
         now = now.mid()
-    off += float(np.linalg.norm(metric.reach)) * dropped * (1 + 1e-9)
+    off = max(off, rounded(start)[1]) + float(np.linalg.norm(metric.reach)) * dropped * (1 + 1e-9)
     values, width = np.array(ends), widths(pieces, metric)
     distinct, where = np.unique(width, return_inverse=True)
     A_size = arb_mat(A.nrows(), A.ncols(), [abs(v) for v in A.entries()])
@@ -127,7 +134,7 @@ def decay(metric: Metric, pieces: tuple[Piece, ...]) -> Decay:
     second = np.abs(rounded(A * A)[0] @ values[:-1])
     second += 1e-9 * second.max()  # its rounding, with much to spare
     curve = (second @ spread) * (width**2 / 8)[:, None, None] * (1 + 1e-9)
-    return Decay(width, values, curve, off)
+    return Decay(width, values, curve, off), now, dropped * (1 + 1e-9)
 
 
 def counts(pieces: Sequence[Piece], metric: Metric) -> list[int]:

@@ -62,6 +62,11 @@ class Metric:
         """c_i ≥ |(T x)_i|/‖x‖_S (p,); T (p, n) exact."""
         return np.sqrt((magnitudes(matrix(T) * self.inverse) ** 2).sum(axis=1)) * (1.0 + 1e-14)
 
+    @property
+    def norm(self) -> Norm:
+        """‖·‖_S."""
+        return Norm("a metric's", self.S)
+
     def of(self, norm: Norm) -> float:
         """c ≥ N(x)/‖x‖_S."""
         if norm.largest:
@@ -122,17 +127,26 @@ def proved_metric(system: ExactSystem, S: Array) -> Metric:
 
     Raises NotProvedError if the linear part does not contract in it, or for entries too large or small for floats.
     """
-    if len(S) != system.n:
-        raise NotProvedError(f"another system: wanted {system.n} states, got {len(S)}")
     zero = [arb(0)]
-    A = jacobian(system, zero * system.n, zero * system.m)
+    return contracting(jacobian(system, zero * system.n, zero * system.m), S)
+
+
+def contracting(A: arb_mat, S: Array) -> Metric:
+    """The metric in which x' = A x contracts; raises NotProvedError as `proved_metric`."""
+    if S.shape != (A.nrows(), A.ncols()):
+        raise NotProvedError(f"another system: wanted {A.nrows()} states, got {len(S)}")
     inverse = usable_inverse(S, "metric")
-    turned = matrix(S) * A * inverse
-    symmetric = (turned + turned.transpose()) / 2
-    alpha = np.inf
-    for i in range(system.n):
-        others: Any = sum((abs(symmetric[i, j]) for j in range(system.n) if j != i), arb(0))
-        alpha = min(alpha, below(-symmetric[i, i] - others))
+    alpha = decay_rate(matrix(S) * A * inverse)
     if not alpha > 0.0:
         raise NotProvedError(f"the linear part does not contract: growth rate up to {-alpha:g} 1/s; wanted < 0")
-    return Metric(S, inverse, A, float(alpha))
+    return Metric(S, inverse, A, alpha)
+
+
+def decay_rate(turned: arb_mat) -> float:
+    """A rate at which ‖x‖₂ decays at least under x' = turned x, by Gershgorin's rows of the symmetric part."""
+    symmetric = (turned + turned.transpose()) / 2
+    alpha = np.inf
+    for i in range(symmetric.nrows()):
+        others: Any = sum((abs(symmetric[i, j]) for j in range(symmetric.nrows()) if j != i), arb(0))
+        alpha = min(alpha, below(-symmetric[i, i] - others))
+    return float(alpha)

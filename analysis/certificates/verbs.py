@@ -20,7 +20,11 @@ def add_verbs(verbs: Any, scenario: str) -> None:
     kind = verb.add_mutually_exclusive_group()
     kind.add_argument("--quick", action="store_true", help="a coarse floor in about a second, by comparison")
     kind.add_argument("--largest", action="store_true", help="also search the largest amplitude that can be certified")
-    kind.add_argument("--closed-loop", action="store_true", help="under control for ever, and against no control")
+    kind.add_argument(
+        "--closed-loop",
+        action="store_true",
+        help="under control for ever, and by time on its horizon (CERT.horizon.json), against no control",
+    )
     kind.add_argument("--bounded", type=float, metavar="A", help="every road with |h| <= A [m] instead, around rest")
     sampled = "every road through the heights of this CSV instead (time, h_fl ... h_rr) that is of --road-class"
     kind.add_argument("--sampled", type=Path, metavar="ROAD.csv", help=sampled)
