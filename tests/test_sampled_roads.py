@@ -130,7 +130,7 @@ def test_a_convolution_is_a_bound_and_close(name: str, monkeypatch: pytest.Monke
     _, proof, form = certificate_of_textbook(name, CLASSES[0])
     n, metric = len(form.A), proof.metric
     none = np.zeros((n, 2))
-    flow = decay(metric, tuple(Piece(fmpq(k, 100), fmpq(k + 1, 100), none, none) for k in range(60)))
+    flow = decay(metric, tuple(Piece(fmpq(k, 100), fmpq(k + 1, 100), none, none) for k in range(59)))
     ends = np.concatenate([[0.0], np.cumsum(flow.width)])
     f = np.random.default_rng(2).uniform(0.0, 1.0, (len(ends) - 1, n))
     for count, width in ((1, 0.5), (1000, 0.002)):
