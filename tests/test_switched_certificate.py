@@ -17,6 +17,7 @@ from test_almost_stable import rehashed
 from test_certificates import certified
 
 from analysis.__main__ import main
+from analysis.bertolino_baksa import switched_certificate
 from analysis.bertolino_baksa.balls import Array, ExactSystem, NotProvedError, precision
 from analysis.bertolino_baksa.certificate import opened
 from analysis.bertolino_baksa.norms import euclid, weighted_sup
@@ -31,7 +32,7 @@ from analysis.bertolino_baksa.switched_certificate import (
 from analysis.bertolino_baksa.taylor import find_pieces
 from analysis.bertolino_baksa.transition import matrices
 from analysis.car import actuators, car_form, road_signal
-from analysis.certificates import certificate_command, closed_loop_certificate
+from analysis.certificates import closed_loop_certificate
 from analysis.certificates.car_certificates import car_norms, certify_car
 from analysis.certificates.closed_loop_certificate import infinite_gain
 from analysis.certificates.finite_horizon import build, certify_horizon, certify_table, parts
@@ -301,7 +302,7 @@ def test_the_command_writes_a_file_of_its_own_and_verify_knows_it(
 ) -> None:
     monkeypatch.setattr(closed_loop_certificate, "both", lambda parameters: (certified(0.01), certified(0.01)))
     monkeypatch.setattr(closed_loop_certificate, "certify_horizon", lambda parameters, norms: made())
-    monkeypatch.setattr(certificate_command, "verify_switched", lambda certificate, build: made()[1])
+    monkeypatch.setattr(switched_certificate, "verify", lambda certificate, build: made()[1])
     where = tmp_path / "c.json"
     assert main(["certify", "bump-lqr", "--closed-loop", "-o", str(where)]) == 0
     said = capsys.readouterr().out

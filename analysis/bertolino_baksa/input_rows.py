@@ -88,6 +88,11 @@ class InputRows:
         """Of the chords (N − 1, k)."""
         return np.asarray(np.diff(self.heights, axis=0) / self.steps[:, None])
 
+    def until(self, t: float) -> InputRows:
+        """The rows up to the first one at t or later."""
+        last = min(int(np.searchsorted(self.times, t)) + 1, len(self.times))
+        return InputRows(self.times[:last], self.heights[:last], self.between)
+
     def refuse_steep(self) -> None:
         """Raise NotProvedError where no height of the class takes the rows' values."""
         if self.between.kind == "lip" and np.any(steep := np.abs(self.slopes) > self.between.bound * SLACK):

@@ -10,8 +10,9 @@ from typing import Any
 import numpy as np
 
 from fmu_src.quantities import STATES
+from fmu_src.vehicle.vehicle7dof import CAR
 
-from ..bertolino_baksa.balls import NotProvedError, precision
+from ..bertolino_baksa.balls import Array, NotProvedError, precision
 from ..bertolino_baksa.bounded_certificate import BoundedCertificate, certify, smallest, to_json
 from ..bertolino_baksa.bounded_inputs import Bounds, Driven, Gains, gains
 from ..bertolino_baksa.norms import proved_metric
@@ -27,9 +28,9 @@ from .directed import at_least, at_most
 from .exact_car import norms
 
 
-def flat(parameters: Mapping[str, Any]) -> dict[str, Any]:
-    """The model of the car alone."""
-    return model_of({**parameters, "profile": "flat"})
+def flat(parameters: Mapping[str, Any], gain: Array | None = None) -> dict[str, Any]:
+    """The model of the car alone, or with a gain (4, 14)."""
+    return model_of({**{name: value for name, value in parameters.items() if name in CAR}, "profile": "flat"}, gain)
 
 
 def car_gains(parameters: Mapping[str, Any]) -> Gains:

@@ -19,9 +19,12 @@ from ..bertolino_baksa.rows_certificate import RowsCertificate, certify, to_json
 from ..car import car_form
 from ..files import write_whole
 from ..reference import Parameters, car_of
+from .adversary_points import row_points
 from .car_bounded_roads import flat
 from .car_certificates import build, metric_of
+from .certificate_figures import draw_delta
 from .certificate_words import model_words, named_by_content, refuse_exceeded, start_words
+from .closed_loop_certificate import infinite_gain
 from .directed import at_least, at_most
 from .exact_car import norms
 from .exported import read_heights
@@ -29,35 +32,40 @@ from .motion_words import along
 from .unknown_roads import road_class
 
 
-def command(parameters: Parameters, road: Path, roads: str, where: Path | None) -> int:
+def command(parameters: Parameters, road: Path, roads: str, where: Path | None, closed: bool) -> int:
     """Certify x_lin from rest on every road of the class through the file's heights; 0, or 1 if nothing is proved.
+
+    closed : whether the controller's constant gain acts at every instant.
 
     Raises InputError for a file that holds no road, and for an unknown class.
     """
     rows = InputRows(*read_heights(road), road_class(roads))
+    gain = infinite_gain(parameters) if closed else None
     print(f"Finding and proving a motion to t = {rows.times[-1]:g} s ...", file=sys.stderr, flush=True)
     try:
-        certificate, proof = certify_rows(parameters, rows)
+        certificate, proof = certify_rows(parameters, rows, gain)
         lines = statement(certificate, proof)
     except NotProvedError as error:
         print(f"no certificate of all these roads: {error}")
         return 1
-    for line in lines:
+    points = row_points(certificate)
+    for line in (*lines, *(each.words for each in points)):
         print(line)
     if where is not None:
         write_whole(where, to_json(certificate))
-        print(f"{where}: written")
+        write_whole(where.with_suffix(".svg"), draw_delta(points))
+        print(f"{where}, {where.with_suffix('.svg')}: written")
     return 0
 
 
-def certify_rows(parameters: Parameters, rows: InputRows) -> tuple[RowsCertificate, Proof]:
+def certify_rows(parameters: Parameters, rows: InputRows, gain: Array | None = None) -> tuple[RowsCertificate, Proof]:
     """The certificate of x_lin from rest for this car. Raises NotProvedError, with the reason, if there is none."""
     car = car_of(parameters)
 
     def named(x_lin: Array) -> tuple[Norm, ...]:
         return norms(car, x_lin)
 
-    return certify(flat(parameters), build, metric_of(car), named, rows, np.zeros(14))
+    return certify(flat(parameters, gain), build, metric_of(car, gain), named, rows, np.zeros(14))
 
 
 def statement(certificate: RowsCertificate, proof: Proof) -> list[str]:

@@ -23,7 +23,9 @@ from ..car import car_form, road_signal
 from ..errors import InputError
 from ..files import write_whole
 from ..reference import Parameters, car_of, road_parameters
+from ..scenario import Scenario
 from ..trajectory import CERTIFICATE
+from .adversary_points import adversary_points
 from .car_certificates import build, car_norms, certify_car, prove_reference
 from .certificate_words import model_words, named_by_content, start_words
 from .directed import at_least
@@ -33,11 +35,15 @@ AnyCertificate = Certificate | BoundedCertificate | RowsCertificate | SwitchedCe
 CLOSE = 1.02  # ratio at which the bisection for the largest amplitude stops
 
 
-def make_certificate(parameters: Parameters, where: Path | None, *, search: bool = False) -> int:
+def make_certificate(scenario: Scenario, where: Path | None, *, search: bool = False, starts: int = 0) -> int:
     """Certify x_lin from rest, print what is proved, write the file; 0, or 1 if there is no certificate.
 
     It is of the car without control: a controller of these parameters is left out, and that is said.
+
+    search : whether the largest amplitude is sought.  starts : number of starts that are tried on the FMUs; 1 is
+             returned if one of them gets beyond ε.
     """
+    parameters = scenario.parameters
     if parameters.get("enabled", True):
         print("The car is certified without its controller; with it: --closed-loop.", file=sys.stderr)
     print("Finding and proving a reference motion ...", file=sys.stderr, flush=True)
@@ -48,19 +54,28 @@ def make_certificate(parameters: Parameters, where: Path | None, *, search: bool
         print(f"no certificate: {error}")
         return 1
     for line in lines:
-        print(line)
+        print(line, flush=True)
+    points = adversary_points(certificate)
+    for line in (each.words for each in points):
+        print(line, flush=True)
     if search:
         A = at_least(largest_amplitude(parameters))
         print(f"  the largest A with a proved tube: {A} m (by bisection, to {CLOSE:g})")
     if where is not None:
         write_whole(where, to_json(certificate))
         print(f"{where}: written")
-        from .certificate_figures import adversary_points, draw_delta
+        from .certificate_figures import draw_delta
 
         picture = where.with_suffix(".svg")
-        write_whole(picture, draw_delta(adversary_points(certificate)))
+        write_whole(picture, draw_delta(points))
         print(f"{picture}: written")
-    return 0
+    if not starts:
+        return 0
+    from .fmu_starts import on_the_fmus
+
+    found, within = on_the_fmus(certificate, scenario, starts)
+    print("\n".join(found))
+    return 0 if within else 1
 
 
 def judge_certificate(path: Path) -> int:

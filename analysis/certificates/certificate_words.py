@@ -11,6 +11,7 @@ import numpy as np
 from fmu_src.quantities import CORNERS, PARAMETERS, STATES
 from fmu_src.road.profiles import PROFILE
 from fmu_src.road.road_excitation import RoadExcitation
+from fmu_src.vehicle.vehicle7dof import CAR
 
 from ..bertolino_baksa.balls import NotProvedError
 from ..bertolino_baksa.certificate import Claim
@@ -57,7 +58,7 @@ def model_words(model: Mapping[str, Any], *, road: bool = True) -> list[str]:
         said["A"] = given.get("A", DEFAULTS["A"])
     said |= {name: value for name, value in given.items() if value != DEFAULTS[name]}
     if not road:
-        said.pop(PROFILE.name)
+        said = {name: value for name, value in said.items() if name in CAR}
     off = ", ".join(f"{name} = {number(value)}{_unit(name)}" for name, value in said.items())
     lines = [f"  {'car and road' if road else 'car'}: {f'{off}; the rest is the default' if off else 'the default'}"]
     if "gain" not in model:
