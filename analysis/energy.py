@@ -6,7 +6,6 @@ d(T + V)/dt = Σ N ḣ + Σ u Δ̇ − Σ b Δ̇² − Σ bp (ḣ − ż_w)²
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from scipy.interpolate import CubicHermiteSpline
@@ -17,6 +16,7 @@ from fmu_src.vehicle.parameters import Car
 
 from .recorded_road import recorded_road
 from .trajectory import Array, Trajectory
+from .tyres import tyre_heights
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,16 +41,6 @@ def kinetic_energy(car: Car, x: Array) -> Array:
     rear = car.m21 + car.m22
     twice = car.m * dz**2 + car.Jx * dpsi**2 + J * dphi**2 + car.m11 * dz11**2 + car.m12 * dz12**2
     return 0.5 * (twice + (rear + car.m2) * dz2**2 + (rear * car.s2**2 + car.J2) * dpsi2**2)
-
-
-def tyre_heights(car: Car, q: Any, v: Any, sin: Any, cos: Any) -> tuple[list[Any], list[Any]]:
-    """Heights (4) [m] of the wheels over the road at rest, and their rates [m/s], from q (7) and v = q̇ (7).
-
-    In numbers of any kind that `sin` and `cos` take.
-    """
-    (z11, z12, z2, psi2), (dz11, dz12, dz2, dpsi2) = q[3:], v[3:]
-    tilt, dtilt = car.s2 * sin(psi2), car.s2 * cos(psi2) * dpsi2
-    return [z11, z12, z2 + tilt, z2 - tilt], [dz11, dz12, dz2 + dtilt, dz2 - dtilt]
 
 
 def strut_rates(car: Car, x: Array) -> Array:

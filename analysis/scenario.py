@@ -272,7 +272,9 @@ def _in_si(value: Any, unit: str) -> float:
     match = _WITH_UNIT.fullmatch(value)
     if not match:
         raise ValueError("got a string that is not a number with a unit")
-    import pint  # takes a moment to import, and most scenarios are in SI numbers
+    if match[2] == unit:
+        return float(match[1])
+    import pint  # takes a moment to import, and most scenarios are in SI units
 
     registry = pint.get_application_registry()
     try:

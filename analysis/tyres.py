@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from fmu_src.quantities import TYRE_FORCES
@@ -23,6 +25,16 @@ def static_loads_of(car: Car) -> Array:
     """Loads (4) [N] of the tyres of a car at rest: its share of the body, its wheel, half the beam."""
     front, rear = car.m * car.b / (2 * (car.a + car.b)), car.m * car.a / (2 * (car.a + car.b)) + car.m2 / 2
     return G * np.array([front + car.m11, front + car.m12, rear + car.m21, rear + car.m22])
+
+
+def tyre_heights(car: Car, q: Any, v: Any, sin: Any, cos: Any) -> tuple[list[Any], list[Any]]:
+    """Heights (4) [m] of the wheels over the road at rest, and their rates [m/s], from q (7) and v = q̇ (7).
+
+    In numbers of any kind that `sin` and `cos` take.
+    """
+    (z11, z12, z2, psi2), (dz11, dz12, dz2, dpsi2) = q[3:], v[3:]
+    tilt, dtilt = car.s2 * sin(psi2), car.s2 * cos(psi2) * dpsi2
+    return [z11, z12, z2 + tilt, z2 - tilt], [dz11, dz12, dz2 + dtilt, dz2 - dtilt]
 
 
 def tyre_loads(run: Run) -> Array:

@@ -111,7 +111,7 @@ def test_the_majorant_is_one_and_it_is_close(equations: Equations) -> None:
         x, y = (rng.choice([-1.0, 1.0], (3, 64)) * size[:, None] for size in (X, Y))
         R = [form.rate(v[:2], v[2:]) - form.A @ v[:2] - form.B @ v[2:] for v in (x + y, x)]
         change = np.abs(R[0] - R[1]).max(axis=1)
-        most = bound.change(X, bound(X[:, None])[:, 0], Y[:, None])[:, 0]
+        most = bound.change(X[:, None], bound(X[:, None]), Y[:, None])[:, 0]
         assert (change <= most + 1e-14).all()  # its own rounding
         closest = max(closest, change[1] / most[1])
     assert closest > 0.99

@@ -22,9 +22,10 @@ from analysis.bertolino_baksa.bounded_certificate import (
     to_json,
     verify,
 )
-from analysis.bertolino_baksa.bounded_inputs import Bounds, Gains, gains, reached, worst_inputs
+from analysis.bertolino_baksa.bounded_inputs import Bounds, Gains, gains
 from analysis.bertolino_baksa.certificate import opened
 from analysis.bertolino_baksa.norms import Norm, euclid, modal_metric, proved_metric, weighted_sup
+from analysis.bertolino_baksa.worst_inputs import reached, worst_inputs
 from analysis.car import car_form
 from analysis.certificates.car_bounded_roads import car_gains, heights, highest
 from analysis.certificates.exact_car import norms

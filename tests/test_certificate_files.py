@@ -12,8 +12,9 @@ import numpy as np
 import pytest
 from test_almost_stable import certified, cubic, rehashed
 from test_bounded_inputs import tied_gains
+from test_switched_certificate import oscillator
 
-from analysis.bertolino_baksa import bounded_certificate, strict
+from analysis.bertolino_baksa import bounded_certificate, strict, switched_certificate
 from analysis.bertolino_baksa.balls import NotProvedError, precision
 from analysis.bertolino_baksa.bounded_inputs import Bounds
 from analysis.bertolino_baksa.certificate import certificate_of, from_json, opened, to_json, verify
@@ -38,9 +39,17 @@ def bounded() -> bytes:
         return bounded_certificate.to_json(bounded_certificate.certify({}, driven, [euclid(2)]))
 
 
+@cache
+def switched() -> bytes:
+    return switched_certificate.to_json(oscillator()[0])
+
+
 def refuse(data: bytes) -> None:
-    content = json.loads(data)
-    read = bounded_certificate.certificate_of if "kind" in content else certificate_of
+    kind = json.loads(data).get("kind")
+    read: Callable[[dict[str, Any]], Any] = {
+        bounded_certificate.KIND: bounded_certificate.certificate_of,
+        switched_certificate.KIND: switched_certificate.certificate_of,
+    }.get(kind, certificate_of)
     with pytest.raises(InputError, match=r"cannot be read as a certificate|wanted a certificate of format"):
         opened(data, "here", read)
 
@@ -67,16 +76,28 @@ COMMON: list[Change] = [
     lambda c: c["claims"][0].update({"delta of eps": []}),
     lambda c: c.update(claims={"norm": 1}),
     lambda c: c["claims"][0]["norm"]["T"][0].__setitem__(0, True),
-    lambda c: c["metric"][0].__setitem__(0, 1),
 ]
-OF_MOTIONS: list[Change] = [
-    lambda c: c["x0"].__setitem__(0, False),
-    lambda c: c["x0"].__setitem__(0, "0.0"),
+OF_METRICS: list[Change] = [lambda c: c["metric"][0].__setitem__(0, 1)]
+OF_PIECES: list[Change] = [
     lambda c: c["pieces"][0].update(remark=""),
     lambda c: c["pieces"][0].update(begin=0),
     lambda c: c["pieces"][0].update(begin="0_0"),
     lambda c: c["pieces"][0].update(begin="0/7"),
     lambda c: c["pieces"][-1].update(end=" " + c["pieces"][-1]["end"]),
+]
+OF_MOTIONS: list[Change] = [
+    lambda c: c["x0"].__setitem__(0, False),
+    lambda c: c["x0"].__setitem__(0, "0.0"),
+]
+OF_PHASES: list[Change] = [
+    lambda c: c.update(phases=[]),
+    lambda c: c.update(x0=[0.0, 0.0]),
+    lambda c: c.update(kind="bounded"),
+    lambda c: c["phases"][1].update(end="2"),
+    lambda c: c["phases"][1].update(begin=1),
+    lambda c: c["phases"][1].update(begin="2/2"),
+    lambda c: c["phases"][1]["metric"][0].__setitem__(0, 1),
+    lambda c: c["phases"][1]["metric"].pop(),
 ]
 OF_BOUNDS: list[Change] = [
     lambda c: c.update(tied=1),
@@ -84,14 +105,21 @@ OF_BOUNDS: list[Change] = [
 ]
 
 
-@pytest.mark.parametrize("change", [*COMMON, *OF_MOTIONS])
+@pytest.mark.parametrize("change", [*COMMON, *OF_METRICS, *OF_PIECES, *OF_MOTIONS])
 def test_a_file_of_a_motion_that_says_anything_else_is_refused(change: Change) -> None:
     content = json.loads(motion())
     change(content)
     refuse(rehashed(content))
 
 
-@pytest.mark.parametrize("change", [*COMMON, *OF_BOUNDS])
+@pytest.mark.parametrize("change", [*COMMON, *OF_PIECES, *OF_PHASES])
+def test_a_file_of_a_changing_linear_part_that_says_anything_else_is_refused(change: Change) -> None:
+    content = json.loads(switched())
+    change(content)
+    refuse(rehashed(content))
+
+
+@pytest.mark.parametrize("change", [*COMMON, *OF_METRICS, *OF_BOUNDS])
 def test_a_file_of_bounded_inputs_that_says_anything_else_is_refused(change: Change) -> None:
     content = json.loads(bounded())
     change(content)

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import subprocess
+import sys
 from collections.abc import Callable
 from dataclasses import replace
 from functools import cache, partial
@@ -17,8 +19,9 @@ from analysis.bertolino_baksa.adversary import excursions, reached, reference_fl
 from analysis.bertolino_baksa.balls import NotProvedError, precision
 from analysis.bertolino_baksa.certificate import Certificate, from_json, to_json, verify
 from analysis.bertolino_baksa.norms import proved_metric
+from analysis.bertolino_baksa.pieces import Piece
 from analysis.bertolino_baksa.proof import Proof, prove
-from analysis.bertolino_baksa.tube import Piece, prove_linear
+from analysis.bertolino_baksa.tube import prove_linear
 from analysis.car import car_form, road_signal
 from analysis.certificates.car_certificates import build, certify_car, model_of, prove_reference
 from analysis.cosimulation import simulate
@@ -155,6 +158,17 @@ def test_a_certificate_is_read_back_and_proved_and_another_car_is_not_it(tmp_pat
     for other in ({"c1": 15000.1}, {"A": 0.010001}, {"tau0": 0.0201}, {"b2": 1100.01}):
         with pytest.raises(NotProvedError):
             verify(replace(again, model={**again.model, "parameters": other}), build)
+
+
+def test_verifying_loads_nothing_to_optimize_integrate_or_draw_with(tmp_path: Path) -> None:
+    path = tmp_path / "bump.json"
+    path.write_bytes(to_json(certified(0.01)[0]))
+    code = (
+        f"import sys; from analysis.__main__ import main; proved = main(['verify', {str(path)!r}]) == 0; "
+        "unused = ('matplotlib', 'pandas', 'pint', 'scipy.integrate', 'scipy.interpolate', 'scipy.optimize', 'sympy'); "
+        "sys.exit(not proved or any(name in sys.modules for name in unused))"
+    )
+    subprocess.run([sys.executable, "-c", code], check=True, stdout=subprocess.DEVNULL)
 
 
 @pytest.mark.parametrize("seed", range(12))

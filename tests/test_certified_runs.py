@@ -15,20 +15,19 @@ from made_up_run import made_up_run
 from matplotlib.figure import Figure
 
 from analysis.__main__ import _certify_shortly, main
-from analysis.bertolino_baksa.adversary import _errors, _furthest, motions
+from analysis.bertolino_baksa.adversary import _errors, furthest_starts, motions
 from analysis.bertolino_baksa.certificate import Certificate, to_json
 from analysis.bertolino_baksa.funnel import ends, funnel
 from analysis.bertolino_baksa.proof import Proof
 from analysis.car import car_form, road_signal
-from analysis.certificates import certificate_command, certificate_figures, certified_run
+from analysis.certificates import certificate_command, certified_run
+from analysis.certificates.adversary_points import Points, adversary_points
 from analysis.certificates.car_certificates import certify_car
 from analysis.certificates.certificate_figures import (
-    Points,
     _delta_panel,
     _magnified_panel,
     _size_panel,
     _tube_panel,
-    adversary_points,
     in_tube,
 )
 from analysis.certificates.directed import at_least
@@ -61,7 +60,7 @@ def at_hand(made: Made, points: list[Points], monkeypatch: pytest.MonkeyPatch) -
     """What takes long was made before."""
     for module in (certificate_command, certified_run):
         monkeypatch.setattr(module, "certify_car", lambda parameters: made)
-    for module in (certificate_figures, certified_run):
+    for module in (certificate_command, certified_run):
         monkeypatch.setattr(module, "adversary_points", lambda certificate: points)
 
 
@@ -90,7 +89,7 @@ def test_motions_from_within_delta_stay_in_the_funnel_which_is_not_much_wider(ma
     delta = float(table[len(table) // 2, 1])
     size, bound = funnel(proof, norm, delta)
     form, signal = car_form(car_of({})), road_signal(road_parameters({}))
-    far = _furthest(form, norm, delta, *_errors(form, signal, np.zeros(14), 0.5), 11)
+    far = furthest_starts(form, norm, delta, *_errors(form, signal, np.zeros(14), 0.5), 11)
     off = np.concatenate([far, rng.normal(size=(14, 20))], axis=1)
     times, x = zip(*motions(form, signal, off * delta / norm(off), 0.5, step=2.5e-4), strict=True)
     x_lin = linear_response(form.A, form.B, np.zeros(14), signal, np.array(times))

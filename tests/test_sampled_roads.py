@@ -12,18 +12,21 @@ from typing import Any
 import numpy as np
 import pytest
 from flint import arb, fmpq
+from scipy.linalg import expm
 from test_almost_stable import Equations, duffing, pendulum, rehashed
 
 from analysis.__main__ import main
+from analysis.bertolino_baksa import convolution as convolutions
 from analysis.bertolino_baksa.adversary import stepped
 from analysis.bertolino_baksa.balls import ExactSystem, NotProvedError, precision
+from analysis.bertolino_baksa.cells import decay
 from analysis.bertolino_baksa.certificate import opened
-from analysis.bertolino_baksa.convolution import convolution
 from analysis.bertolino_baksa.input_rows import InputRows, RowClass, looseness, windows
 from analysis.bertolino_baksa.majorant import majorant
-from analysis.bertolino_baksa.norms import euclid, modal_metric, weighted_sup
+from analysis.bertolino_baksa.norms import Norm, euclid, modal_metric, weighted_sup
+from analysis.bertolino_baksa.pieces import Piece
 from analysis.bertolino_baksa.proof import Proof
-from analysis.bertolino_baksa.rows_adversary import bow, reached
+from analysis.bertolino_baksa.rows_adversary import _signs, _steps, beside, reached
 from analysis.bertolino_baksa.rows_certificate import RowsCertificate, certificate_of, certify, to_json, verify
 from analysis.car import car_form, road_signal
 from analysis.certificates.car_certificates import build as car_build
@@ -40,10 +43,10 @@ HEIGHTS = tuple(q.name for q in ROAD_HEIGHTS)
 CLASSES = [RowClass("curv", 4.0), RowClass("lip", 0.7)]
 
 
-def rough(end: float = 2.0, step: float = 0.02) -> tuple[Array, Array]:
+def rough(end: float = 1.2, step: float = 0.02) -> tuple[Array, Array]:
     """Two heights with a corner at a row and steps of different lengths."""
     t = np.round(np.arange(round(end / step) + 1) * step, 9)
-    t = np.delete(t, [3, 40, 41])
+    t = np.delete(t, [3, 8, 9])
     u = 0.1 * np.stack([np.sin(3.0 * t), np.maximum(np.sin(2.0 * np.pi * (t - 0.5)), 0.0)], axis=1)
     return t, u
 
@@ -56,9 +59,8 @@ def members(rows: InputRows, rng: np.random.Generator, parts: int) -> tuple[Arra
     heights, rates = np.empty((2, *times.shape, rows.slopes.shape[1]))
     for i, width in enumerate(widths.tolist()):
         for j, share in enumerate(s.tolist()):
-            up, rate = bow(rows.between, width, share * width, share * width, rows.slopes[i])
-            heights[i, j] = rows.heights[i] + share * width * rows.slopes[i] + side[i] * up
-            rates[i, j] = rows.slopes[i] + side[i] * rate
+            up, rate = beside(rows.between, width, share * width, rows.slopes[i], side[i])
+            heights[i, j], rates[i, j] = rows.heights[i] + share * width * rows.slopes[i] + up, rows.slopes[i] + rate
     return times, heights, rates
 
 
@@ -84,7 +86,7 @@ def test_no_member_of_the_class_is_further_off_the_windows_than_is_said(between:
             k = heights.shape[2]
             assert (off.max(axis=(0, 1)) <= peak[:k]).all() and (rate.max(axis=(0, 1)) <= peak[k:]).all()
             trapezium = ((off[:, 1:] + off[:, :-1]) / 2.0).mean(axis=1).max(axis=0)
-            assert (trapezium <= mean[:k]).all()
+            assert (trapezium <= mean).all()
             nearest = min(nearest, float((peak[:k] / off.max(axis=(0, 1))).min()))
     assert nearest < 1.5  # it is not much too much
 
@@ -122,95 +124,136 @@ def test_a_change_near_a_point_is_bounded_and_closely(equations: Equations) -> N
     assert closest > 0.8
 
 
-def test_a_convolution_is_bounded_closely() -> None:
-    """q' = A q + f of an oscillator at rest, f of size 1 with the signs that drive q furthest: ∫|e^(As)| ds."""
-    proof = certificate_of_textbook(duffing, CLASSES[0])[1]
-    along = convolution(proof.decay, np.eye(2))
-    found = along(np.tile([0.0, 1.0], (len(proof.decay.width), 1)))[-1]
-    a, b = 0.5, np.sqrt(3.75)
-    s = np.linspace(0.0, 2.0, 200_001)
-    kernel = np.abs(np.exp(-a * s) * np.sin(b * s) / b)
-    exact = np.trapezoid(kernel, s)
-    assert exact < found[0] < 1.05 * exact
+@pytest.mark.parametrize("name", ["duffing", "stiff"])
+def test_a_convolution_is_a_bound_and_close(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of forcings by chance on the cells, by windows much wider than these too; and of 1 with the worst signs."""
+    _, proof, form = certificate_of_textbook(name, CLASSES[0])
+    n, metric = len(form.A), proof.metric
+    none = np.zeros((n, 2))
+    flow = decay(metric, tuple(Piece(fmpq(k, 100), fmpq(k + 1, 100), none, none) for k in range(59)))
+    ends = np.concatenate([[0.0], np.cumsum(flow.width)])
+    f = np.random.default_rng(2).uniform(0.0, 1.0, (len(ends) - 1, n))
+    for count, width in ((1, 0.5), (1000, 0.002)):
+        monkeypatch.setattr(convolutions, "LEAST", count)
+        monkeypatch.setattr(convolutions, "WIDTH", width)
+        along = convolutions.convolution(flow, np.eye(n))
+        for cell in range(len(f) - 3):  # one push, near the end of its window or not, and what it leaves
+            found = along.by_cells(along(f * (np.arange(len(f)) == cell)[:, None]))
+            later = float(ends[cell + 3] - (ends[cell] + ends[cell + 1]) / 2.0)
+            exact = np.abs(expm(form.A * later)) @ f[cell] * flow.width[cell]
+            assert (exact <= found[cell + 2] * 1.01).all()
+        found = along.by_cells(along(np.ones_like(f)))
+        for cell in range(5, len(f), 17):
+            s = np.linspace(0.0, float(ends[cell + 1]), 4001)
+            exact = np.trapezoid(np.abs(expm(form.A * s[:, None, None])).sum(axis=2), s, axis=0)
+            assert (exact <= found[cell] * 1.001).all()
+    whole = along(np.ones_like(f))[-1]
+    s = np.linspace(0.0, float(ends[-1]), 20001)
+    exact = np.trapezoid(np.abs(expm(form.A * s[:, None, None])).sum(axis=2), s, axis=0)
+    assert (whole < (1.1 if name == "duffing" else 1.4) * exact).all()
 
 
 # ---------------------------------------------------------------------------------------------- textbook systems
-def two_inputs(equations: Equations) -> Equations:
+def rated(x: Any, w: Any, sin: Any, cos: Any) -> list[Any]:
+    """The rate of the height drives it, in its linear part and beyond."""
+    restoring = sin(x[0]) * -4.0 - x[1] - x[0] * x[0] * x[0] * 0.5
+    return [x[1], restoring + w[0] * 4.0 + w[1] * 0.5 + w[1] * x[0] * x[1] * 0.5 + cos(x[0]) * w[0]]
+
+
+def stiff(x: Any, w: Any, sin: Any, cos: Any) -> list[Any]:
+    """Much faster than rows follow each other; what is open in the height also enters beyond the linear part."""
+    return [x[0] * -20.0 + w[0] * 20.0 + w[0] * w[0] * 10.0]
+
+
+def of_height(equations: Equations) -> Equations:
     """One height for the force; its rate is no part of the equations."""
     return lambda x, w, sin, cos: equations(x, [w[0] * 4.0], sin, cos)
 
 
+SYSTEMS: dict[str, tuple[Equations, list[float]]] = {
+    "duffing": (of_height(duffing), [0.0, 0.0]),
+    "pendulum": (of_height(pendulum), [0.0, 0.0]),
+    "rated": (rated, [0.15, -0.2]),
+    "stiff": (stiff, [0.0]),
+}
+
+
+def textbook(name: str) -> Callable[..., ExactSystem]:
+    equations, x0 = SYSTEMS[name]
+    rest = ((fmpq(0), lambda t: [arb(0), arb(0)]),)
+    return lambda model: ExactSystem(len(x0), 2, equations, rest, fmpq(0))
+
+
+def norms_of(n: int) -> tuple[Norm, Norm]:
+    return euclid(n), weighted_sup(np.array([1.0, 2.0])[:n])
+
+
 @cache
-def certificate_of_textbook(equations: Equations, between: RowClass) -> tuple[RowsCertificate, Proof, StandardForm]:
-    made = two_inputs(equations)
-    form = standard_form(made, ["a", "b"], 2)
-    t, u = rough()
+def certificate_of_textbook(name: str, between: RowClass) -> tuple[RowsCertificate, Proof, StandardForm]:
+    equations, start = SYSTEMS[name]
+    n = len(start)
+    form = standard_form(equations, [f"x{i}" for i in range(n)], 2)
+    t, u = rough(step=0.1) if name == "stiff" else rough()
     rows = InputRows(t, u[:, 1:], between)
-    norms = euclid(2), weighted_sup(np.array([1.0, 2.0]))
-    certificate, proof = certify({}, textbook(equations), modal_metric(form.A, np.eye(2)), lambda _: norms, rows, REST)
-    return certificate, proof, form
-
-
-REST = np.zeros(2)
-
-
-def textbook(equations: Equations) -> Callable[..., ExactSystem]:
-    made = two_inputs(equations)
-    return lambda model: ExactSystem(2, 2, made, ((fmpq(0), lambda t: [arb(0), arb(0)]),), fmpq(0))
+    S = modal_metric(form.A, np.eye(n))
+    return *certify({}, textbook(name), S, lambda _: norms_of(n), rows, np.array(start)), form
 
 
 @pytest.mark.parametrize("between", CLASSES, ids=str)
-@pytest.mark.parametrize("equations", [duffing, pendulum])
-def test_no_start_and_no_member_gets_beyond(equations: Equations, between: RowClass) -> None:
-    """On 12 members of the class, 40 starts each at N = δ: N(x − x_lin) stays within ε; x_lin within what is open."""
-    certificate, proof, form = certificate_of_textbook(equations, between)
-    assert verify(certificate, textbook(equations)).open is not None
-    rng, parts = np.random.default_rng(8), 8
-    begins = np.concatenate([[0.0], np.cumsum(proof.decay.width)])
+@pytest.mark.parametrize("name", SYSTEMS)
+def test_no_start_and_no_member_gets_beyond(name: str, between: RowClass) -> None:
+    """Members by chance and in resonance, 30 starts each at N = δ: N(x − x_lin) stays within ε; x_lin, x and w within
+    what is said of them."""
+    certificate, proof, form = certificate_of_textbook(name, between)
+    assert verify(certificate, textbook(name)).open is not None
+    rng, n, rows = np.random.default_rng(8), len(form.A), certificate.rows
+    begins, x0 = np.concatenate([[0.0], np.cumsum(proof.decay.width)]), certificate.x0
     known = proof.open
     assert known is not None
-    for number in range(12):
-        times, heights, rates = members(certificate.rows, rng, 2 * parts)
-        w = np.concatenate([heights, rates], axis=2)
+    signs = _signs(form, rows)
+    nearest = 0.0
+    for number in range(2, signs.shape[2] + 2, 2):
+        side = signs[:, :, number] if number < signs.shape[2] else rng.choice([-1.0, -0.3, 0.5, 1.0], rows.slopes.shape)
         claim = certificate.claims[number % 2]
         epsilon, delta = claim.table[rng.integers(len(claim.table))]
-        off = rng.normal(size=(2, 40))
+        off = rng.normal(size=(n, 30))
         off *= delta / claim.norm(off)
         off[:, 0] = 0.0
-        z, x, reference, most = np.zeros((2, 1)), off, np.zeros((2, 1)), np.zeros(40)
-        for cell in range(len(times)):
-            for part in range(parts):
-                at, h = slice(2 * part, 2 * part + 3), float(times[cell, 2] - times[cell, 0])
-                inputs = [v[:, None] for v in w[cell, at]]
-                x = stepped(form.rate, x, h, *inputs)
-                z = stepped(lambda y, v: form.A @ y + form.B @ v, z, h, *inputs)
-                most = np.maximum(most, claim.norm(x - z))
-            # x_lin under the windows' polynomials, by the pieces
-            end = float(times[cell, -1])
-            piece = next(p for p in certificate.pieces if float(p.begin) <= end <= float(p.end) + 1e-12)
-            tau = (end - float(piece.begin)) / float(piece.duration)
+        x, z, t, most = x0[:, None] + off, x0[:, None], 0.0, np.zeros(30)
+        for h, inputs in _steps(rows, side[:, :, None]):
+            x = stepped(form.rate, x, h, *inputs)
+            z = stepped(lambda y, v: form.A @ y + form.B @ v, z, h, *inputs)
+            t, most = t + h, np.maximum(most, claim.norm(x - z))
+            piece = next(p for p in certificate.pieces if t <= float(p.end) + 1e-9)
+            tau = (t - float(piece.begin)) / float(piece.duration)
             reference = piece.linear @ tau ** np.arange(piece.linear.shape[1])
-            spot = min(int(np.searchsorted(begins, end, side="right")) - 1, len(known.linear) - 1)
-            assert (np.abs(z[:, 0] - reference) <= known.linear[spot] + 1e-6).all()
+            cell = min(int(np.searchsorted(begins, t, side="right")) - 1, len(known.linear) - 1)
+            spots = slice(max(cell - 1, 0), cell + 1)
+            zeta = np.abs(z[:, 0] - reference)
+            assert (zeta <= known.linear[spots].max(axis=0) + 1e-9).all()
+            nearest = max(nearest, float((zeta / known.linear[spots].max(axis=0)).max()))
+            reached_here = np.concatenate([x[:, 0], inputs[1][:, 0]])
+            assert (np.abs(reached_here) <= proof.X[spots].max(axis=0) * (1.0 + 1e-6) + 1e-9).all()
         assert most[0] <= claim.floor
         assert most.max() <= epsilon
+    assert nearest > 0.3
 
 
 def test_what_is_said_is_not_much_too_much() -> None:
-    for equations, between in ((duffing, CLASSES[0]), (pendulum, CLASSES[0])):
-        certificate, _, form = certificate_of_textbook(equations, between)
-        far = reached(form, [c.norm for c in certificate.claims], certificate.rows, REST)
-        assert all(1.0 <= c.floor / f < 1.5 for c, f in zip(certificate.claims, far, strict=True))
+    for name in ("duffing", "pendulum"):
+        certificate, _, form = certificate_of_textbook(name, CLASSES[0])
+        far = reached(form, [c.norm for c in certificate.claims], certificate.rows, certificate.x0)
+        assert all(1.0 <= c.floor / f < 1.3 for c, f in zip(certificate.claims, far, strict=True))
 
 
 def test_where_nothing_is_open_it_is_the_floor_of_the_known_road() -> None:
     """Rows of a straight line are all its class curv:0 leaves: l is that of the polynomials themselves."""
     t = np.linspace(0.0, 2.0, 9)
     rows = InputRows(t, 0.05 * t[:, None], RowClass("curv", 0.0))
-    form, norms = standard_form(two_inputs(duffing), ["a", "b"], 2), (euclid(2),)
+    form, norms, rest = standard_form(of_height(duffing), ["a", "b"], 2), (euclid(2),), np.zeros(2)
     S = modal_metric(form.A, np.eye(2))
-    certificate, proof = certify({}, textbook(duffing), S, lambda _: norms, rows, REST)
-    far = reached(form, norms, rows, REST)[0]
+    certificate, proof = certify({}, textbook("duffing"), S, lambda _: norms, rows, rest)
+    far = reached(form, norms, rows, rest)[0]
     assert proof.open is not None and proof.open.linear.max() < 1e-9
     assert 1.0 <= certificate.claims[0].floor / far < 1.01
 
@@ -247,17 +290,17 @@ WRONG: dict[str, Callable[[dict[str, Any]], Any]] = {
 
 @pytest.mark.parametrize("change", WRONG.values(), ids=WRONG)
 def test_a_changed_file_is_refused_or_not_proved(change: Callable[[dict[str, Any]], Any]) -> None:
-    content = json.loads(to_json(certificate_of_textbook(pendulum, CLASSES[0])[0]))
+    content = json.loads(to_json(certificate_of_textbook("pendulum", CLASSES[0])[0]))
     change(content)
     with pytest.raises((InputError, NotProvedError)):
-        verify(opened(rehashed(content), "here", certificate_of), textbook(pendulum))
+        verify(opened(rehashed(content), "here", certificate_of), textbook("pendulum"))
 
 
 def test_a_file_says_all_of_the_certificate() -> None:
-    certificate, _, _ = certificate_of_textbook(pendulum, CLASSES[0])
+    certificate, _, _ = certificate_of_textbook("pendulum", CLASSES[0])
     again = opened(to_json(certificate), "here", certificate_of)
     assert to_json(again) == to_json(certificate)
-    verify(again, textbook(pendulum))
+    verify(again, textbook("pendulum"))
 
 
 # ---------------------------------------------------------------------------------------------- the car

@@ -10,8 +10,8 @@ from collections.abc import Callable, Iterator, Sequence
 import numpy as np
 from scipy.linalg import expm
 
+from ..methods.deviation import deviation
 from ..methods.linear_response import linear_response
-from ..methods.nonlinear_response import nonlinear_response
 from ..methods.signals import Piece, Signal
 from ..methods.standard_form import StandardForm
 from .balls import Array
@@ -19,7 +19,6 @@ from .norms import Norm
 
 STEP = 5e-4  # s, at most
 LAST, LAST_OF_ENDLESS = 3.0, 8.0  # times 1/α after the last corner
-TIGHT = 1e-11  # of the motion from x0 itself
 CANDIDATES = 64  # starts that the linear part proposes
 SPREAD = 8  # times as many are in the running: the best have neighbours nearly as good
 FEW = 12  # of them for a picture
@@ -66,9 +65,14 @@ def _steps(signal: Signal, stop: float, step: float) -> Iterator[tuple[Piece, Ar
 
 def reference_error(form: StandardForm, signal: Signal, x0: Array, stop: float, step: float) -> tuple[Array, Array]:
     """Times (N,) [s], those of `motions`, and e = x − x_lin (n, N) of the motion from x0 itself, tightly integrated."""
-    times = np.concatenate([[signal.edges[0]], *(times[1:] for _, times in _steps(signal, stop, step))])
-    x = nonlinear_response(form, x0, signal, times, rtol=TIGHT)
-    return times, x - linear_response(form.A, form.B, x0, signal, times)
+    finer, steps = 2 * int(np.ceil(step / STEP)), list(_steps(signal, stop, step))
+    times = [np.linspace(at[0], at[-1], finer * (len(at) - 1) + 1) for _, at in steps]
+    x_lin = linear_response(form.A, form.B, x0, signal, np.concatenate(times))
+    by_pieces = np.split(x_lin, np.cumsum([len(t) for t in times])[:-1], axis=1)
+    e = [np.zeros((len(x0), 1))]
+    for (piece, _), t, along in zip(steps, times, by_pieces, strict=True):
+        e.append(deviation(form, along, piece(t), e[-1][:, -1], t[1] - t[0])[:, finer::finer])
+    return np.concatenate([signal.edges[:1], *(at[1:] for _, at in steps)]), np.concatenate(e, axis=1)
 
 
 def _offsets(
@@ -114,7 +118,7 @@ def worst(
     The first starts are those that the linear part carries furthest from e on, at many times. From the worst of them
     on, the full equations are linearised around their own motion, whose furthest start is the next.
     """
-    crowd = _furthest(form, norm, delta, *_errors(form, signal, x0, stop), CANDIDATES)
+    crowd = furthest_starts(form, norm, delta, *_errors(form, signal, x0, stop), CANDIDATES)
     best, at = 0.0, crowd[:, 0]
     for _ in range(rounds + 1):
         off = np.stack(list(_offsets(form, signal, x0, crowd, stop)), axis=1)
@@ -152,13 +156,19 @@ def reached(
 
     By FEW first starts like those of `worst`, without its rounds and all in one integration.
     """
-    errors = _errors(form, signal, x0, stop)
-    crowds = [
-        np.stack([_furthest(form, norm, d, *errors, FEW) for d in delta.tolist()], axis=1).reshape(len(x0), -1)
-        for norm, delta in zip(norms, deltas, strict=True)
-    ]
-    found = excursions(form, signal, norms, x0, np.concatenate(crowds, axis=1), stop)
-    own = np.split(found, np.cumsum([crowd.shape[1] for crowd in crowds])[:-1], axis=1)
+    crowd = crowds(form, norms, deltas, *_errors(form, signal, x0, stop))
+    return by_deltas(excursions(form, signal, norms, x0, crowd, stop), deltas)
+
+
+def crowds(form: StandardForm, norms: Sequence[Norm], deltas: Sequence[Array], times: Array, e: Array) -> Array:
+    """FEW starts (n, …) for each norm's deltas, one after the other, by e (n, N) at the times."""
+    pairs = [(norm, d) for norm, delta in zip(norms, deltas, strict=True) for d in delta.tolist()]
+    return np.concatenate([furthest_starts(form, norm, d, times, e, FEW) for norm, d in pairs], axis=1)
+
+
+def by_deltas(found: Array, deltas: Sequence[Array]) -> list[Array]:
+    """The largest of what each delta's starts of `crowds` reach in its norm, from all that they reach (norms, …)."""
+    own = np.split(found, np.cumsum([FEW * len(delta) for delta in deltas])[:-1], axis=1)
     return [own[i][i].reshape(len(delta), -1).max(axis=1) for i, delta in enumerate(deltas)]
 
 
@@ -167,7 +177,7 @@ def _errors(form: StandardForm, signal: Signal, x0: Array, stop: float) -> tuple
     return reference_error(form, signal, x0, min(stop, HORIZON), min(stop, HORIZON) / INSTANTS)
 
 
-def _furthest(form: StandardForm, norm: Norm, delta: float, times: Array, e: Array, count: int) -> Array:
+def furthest_starts(form: StandardForm, norm: Norm, delta: float, times: Array, e: Array, count: int) -> Array:
     """Starts (n, count) with N = delta for which N(e + e^(At) y) is largest at the times when it is largest."""
     inverse = np.asarray(np.linalg.inv(norm.T), dtype=float)
     carried = norm.T @ expm((times - times[0])[:, None, None] * form.A) @ inverse

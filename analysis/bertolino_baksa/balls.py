@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 Balls = Sequence[Any]
 BITS = 96
+UNIT, TINY = 2.0**-52, 1e-300  # rounding of a float, relative and, of few of them, where they are denormal
 Inputs = Callable[[Any], list[Any]]
 
 
@@ -130,11 +131,17 @@ def magnitudes(m: arb_mat) -> Array:
 
 
 def rounded(m: arb_mat) -> tuple[Array, float]:
-    """Exact floats near the entries, and a bound of the sum of what is left (hence of its norms)."""
-    entries = m.entries()
-    centre = [float(v.mid()) for v in entries]
-    rest = sum((abs(v - arb(c)) for v, c in zip(entries, centre, strict=True)), arb(0))
-    return np.array(centre).reshape(m.nrows(), m.ncols()), above(rest)
+    """Exact floats near the entries, and a bound of the sum of what is left (hence of its norms).
+
+    What is left are the balls' radii, of which a row's sum has at least as much, and half a unit of each float, or one.
+    Raises NotProvedError unless that is finite.
+    """
+    centre = np.array([float(v) for v in m.entries()]).reshape(m.nrows(), m.ncols())
+    sums = m * arb_mat([[1]] * m.ncols())
+    rest = above(sum((v.rad() for v in sums.entries()), arb(0))) + UNIT * float(np.abs(centre).sum())
+    if not rest < math.inf:
+        raise NotProvedError(f"no finite bound: {m}")
+    return centre, rest * (1.0 + 1e-9) + TINY
 
 
 def coefficients(series: Any, length: int) -> list[Any]:
@@ -144,15 +151,17 @@ def coefficients(series: Any, length: int) -> list[Any]:
 
 
 def jacobian(system: ExactSystem, x: Balls, w: Balls, *, inputs: bool = False) -> arb_mat:
-    """∂F/∂x (n, n), or ∂F/∂w (n, m), over the balls x and w: one pass with a nilpotent increment for each column."""
-    columns = []
-    with precision(2):
-        for j in range(system.m if inputs else system.n):
-            xs, ws = list(x), list(w)
-            moved = ws if inputs else xs
-            moved[j] = arb_series([moved[j], 1])
-            columns.append([coefficients(rate, 2)[1] for rate in system.equations(xs, ws, sine, cosine)])
-    return arb_mat(columns).transpose()
+    """∂F/∂x (n, n), or ∂F/∂w (n, m), over the balls x and w.
+
+    The increments of k variables are s^k … s^(2k − 1) in a series in s of 2k terms, which drops their products: all
+    columns come from one pass.
+    """
+    moved = w if inputs else x
+    k = len(moved)
+    with precision(2 * k):
+        series = [arb_series([v, *[0] * (k - 1 + j), 1]) for j, v in enumerate(moved)]
+        rates = system.equations(*((x, series) if inputs else (series, w)), sine, cosine)
+        return arb_mat([coefficients(rate, 2 * k)[k:] for rate in rates])
 
 
 def two_norm(m: Array) -> Array:

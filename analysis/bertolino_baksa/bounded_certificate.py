@@ -28,12 +28,13 @@ from .search import CLOSE, largest
 KIND = "bounded inputs"
 SHARES = (0.1, 0.25, 0.5, 0.75, 1.0)  # of the largest δ, in the table of δ(ε)
 THEOREM = (
-    "Let w be any inputs of x' = F(x, w(t)) with |w_i(t)| <= bounds_i for all t >= 0; where `tied`, the second half of "
-    "them are the rates (almost everywhere) of the first half, which are 0 at t = 0. F(0, 0) = 0, and psi = 0. For "
-    "every eps >= l let delta(eps) be the largest delta of the table whose eps is not above it. Then, whatever w, "
-    "every solution x with N(x(0)) < delta(eps) satisfies N(x(t)) < eps for all t >= 0: psi is an almost stable "
-    "approximate solution (definition 2.1, Bertolino and Baksa). N(x) = |T x|_2, or max |(T x)_i| where the norm says "
-    "so; all numbers are SI and exact as printed."
+    "Let w be any inputs of x' = F(x, w(t)) with |w_i(t)| <= bounds_i for all t >= 0; where `tied`, the first half of "
+    "them are 0 at t = 0 and Lipschitz with the bounds of the second half, |w_i(s) - w_i(t)| <= bounds_(i + m/2) "
+    "|s - t|, and the second half are their rates. F(0, 0) = 0, and psi = 0. For every eps >= l let delta(eps) be the "
+    "largest delta of the table whose eps is not above it. Then, whatever w, every solution x with N(x(0)) < "
+    "delta(eps) satisfies N(x(t)) < eps for all t >= 0: psi is an almost stable approximate solution (definition 2.1, "
+    "Bertolino and Baksa). N(x) = |T x|_2, or max |(T x)_i| where the norm says so; all numbers are SI and exact as "
+    "printed."
 )
 
 

@@ -10,22 +10,17 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import pairwise
 
 import numpy as np
 from flint import arb_mat, fmpq
-from scipy.linalg import expm
-from scipy.optimize import linprog
-from scipy.sparse import diags, vstack
 
-from ..methods.standard_form import StandardForm
-from .adversary import slowest, stepped
 from .balls import Array, ExactSystem, NotProvedError, matrix, rounded
 from .cells import CELLS, Decay, decay
 from .majorant import Majorant, majorant
 from .norms import Metric, Norm, usable_inverse
+from .pieces import Piece
 from .slopes import largest_outputs
-from .tube import Piece, input_matrix
+from .tube import input_matrix
 
 TURN = 0.06  # rad that the fastest mode turns over a cell
 LONG = 16.0  # times the slowest time constant: what comes later is bounded as a whole
@@ -33,15 +28,11 @@ ROOMS = (1.5, 4.0, 10.0)  # of the box, over what the linear part does
 ROOM_INPUT = 2.0
 ROUNDS = 200  # of the iteration for Y
 STRICT = 1e-9  # relative: by which Y exceeds what it must
-MEMORY = 4.0  # slowest time constants that the worst input is made for
-SAMPLES = 1200  # over them
-TURNS, TURNS_TIED = 12, 3  # of the search for the worst input in a norm
-STARTS = 2  # of it where the inputs are tied
 
 
 @dataclass(frozen=True, slots=True)
 class Bounds:
-    """|w_i(t)| ≤ sizes_i (m,) for all t ≥ 0; `tied`: the second half are the rates of the first, 0 at t = 0."""
+    """|w_i(t)| ≤ sizes_i (m,) for all t ≥ 0; `tied`: the first half Lipschitz, 0 at t = 0, the second their rates."""
 
     sizes: Array
     tied: bool = False
@@ -131,9 +122,9 @@ class Driven:
 
 def _forced(bound: Majorant, Y: Array, W: Array) -> Array:
     """Bound (n,) of |R(x, w)| for |x| ≤ Y, |w| ≤ W; inf out of the box."""
-    nothing = np.zeros(len(Y) + len(W))
+    nothing = np.zeros((len(Y) + len(W), 1))
     with np.errstate(over="ignore", invalid="ignore"):
-        return bound.change(nothing, np.zeros(len(Y)), np.concatenate([Y, W])[:, None])[:, 0]
+        return bound.change(nothing, nothing[: len(Y)], np.concatenate([Y, W])[:, None])[:, 0]
 
 
 def gains(system: ExactSystem, metric: Metric) -> Gains:
@@ -144,58 +135,3 @@ def gains(system: ExactSystem, metric: Metric) -> Gains:
     none = np.zeros((system.n, 1))
     found = decay(metric, tuple(Piece(k * step, (k + 1) * step, none, none) for k in range(count)))
     return Gains(system, metric, found, found.integral(metric, np.eye(system.n), matrix(np.eye(system.n))))
-
-
-def worst_inputs(form: StandardForm, norm: Norm, bounds: Bounds) -> Array:
-    """Inputs (SAMPLES + 1, m) within the bounds at even times that the linear part makes a large N of at the end.
-
-    The best for c x(T) is found for directions c in which N grows, over and over: of independent inputs, which are held
-    over a step, by the signs of their kernel, and of heights that run straight from time to time by linear programming.
-    """
-    step = MEMORY * slowest(form) / SAMPLES
-    over, kernel = expm(form.A * step), np.empty((SAMPLES, *form.B.shape))
-    kernel[-1] = expm(form.A * step / 2.0) @ form.B * step
-    for k in range(SAMPLES - 1, 0, -1):
-        kernel[k - 1] = over @ kernel[k]
-    best, found = 0.0, np.zeros((SAMPLES + 1, len(bounds.sizes)))
-    gained = np.abs(np.einsum("pn,knm->kpm", norm.T, kernel)).sum(axis=0) @ bounds.sizes
-    for row in norm.T[np.argsort(-gained)[: STARTS if bounds.tied else len(gained)]]:
-        c = row
-        for _ in range(1 if norm.largest else TURNS_TIED if bounds.tied else TURNS):
-            tried = (_ramps if bounds.tied else _switches)(np.tensordot(c, kernel, (0, 1)), bounds.sizes, step)
-            end = np.einsum("knm,km->n", kernel, (tried[:-1] + tried[1:]) / 2.0 if bounds.tied else tried[:-1])
-            if norm(end) > best:
-                best, found = float(norm(end)), tried
-            c = norm.T.T @ (norm.T @ end)
-    return found
-
-
-def _switches(weights: Array, W: Array, step: float) -> Array:
-    signs = np.where(weights < 0.0, -1.0, 1.0)
-    return W * np.concatenate([signs, signs[-1:]])
-
-
-def _ramps(weights: Array, W: Array, step: float) -> Array:
-    """Σ weights (w_k + w_(k+1))/2 made largest over heights with h_0 = 0, |h_k| ≤ A, |h_(k+1) − h_k| ≤ V step."""
-    half, steps = len(W) // 2, len(weights)
-    found = np.zeros((steps + 1, 2 * half))
-    difference = diags([-np.ones(steps), np.ones(steps)], [0, 1], shape=(steps, steps + 1), format="csr")
-    for i, (A, V) in enumerate(zip(W[:half].tolist(), W[half:].tolist(), strict=True)):
-        value = np.convolve(weights[:, i], [0.5, 0.5]) + difference.T @ weights[:, half + i] / step
-        limits = [(0.0, 0.0), *[(-A, A)] * steps]
-        rows = vstack([difference, -difference])
-        h = linprog(-value, rows, np.full(2 * steps, V * step), bounds=limits, method="highs").x
-        found[:, i], found[:-1, half + i] = h, np.diff(h) / step
-    found[-1, half:] = found[-2, half:]
-    return found
-
-
-def reached(form: StandardForm, norm: Norm, bounds: Bounds, inputs: Array) -> float:
-    """sup N(x) of the motion from rest under inputs that `worst_inputs` made."""
-    step = MEMORY * slowest(form) / SAMPLES
-    x, most, heights = np.zeros((len(form.A), 1)), 0.0, np.arange(inputs.shape[1]) < inputs.shape[1] // 2
-    for before, after in pairwise(inputs):
-        last = np.where(heights & bounds.tied, after, before)
-        x = stepped(form.rate, x, step, *(v[:, None] for v in (before, (before + last) / 2.0, last)))
-        most = max(most, float(norm(x)[0]))
-    return most

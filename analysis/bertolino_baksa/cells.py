@@ -8,13 +8,15 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 from flint import arb, arb_mat
 
 from .balls import Array, ExactSystem, above, magnitudes, matrix, rounded, two_norm
 from .norms import Metric, Norm
-from .tube import Outputs, Piece, Tube, enclosed_series
+from .pieces import Piece
+from .tube import Outputs, Tube, enclosed_series
 
 CELLS, LATE_CELLS = 12, 3  # per piece, for e^(At) and the growth of perturbations: at first, and from
 LATE = 2.0  # times the slowest time constant on, when what oscillates fast has died out
@@ -25,7 +27,8 @@ EPS = 1e-13  # relative: covers the roundings of a polynomial's or a product's v
 
 @dataclass(frozen=True, slots=True)
 class Decay:
-    """e^(At) over the cells: width [s] (N,), ends (N + 1, n, n), and `curve` (N, n, n) ≥ sup |A² e^(At)| Δ²/8."""
+    """Φ over the cells, e^(At) for a constant A: width [s] (N,), ends (N + 1, n, n), and `curve` (N, n, n) ≥
+    sup |Φ''| Δ²/8."""
 
     width: Array
     ends: Array
@@ -97,12 +100,18 @@ class Decay:
 
 
 def decay(metric: Metric, pieces: tuple[Piece, ...]) -> Decay:
-    """e^(At) over the cells of the pieces, from the first piece's begin.
+    """e^(At) over the cells of the pieces, from the first piece's begin."""
+    return carried_on(metric, pieces, matrix(np.eye(len(metric.S))), 0.0)[0]
+
+
+def carried_on(metric: Metric, pieces: Sequence[Piece], start: arb_mat, dropped: float) -> tuple[Decay, arb_mat, float]:
+    """e^(At) Φ over the cells of the pieces, for a Φ within `dropped` [‖S ·‖, Frobenius] of `start`, exact; the last of
+    it, exact, and how far that is off.
 
     From piece to piece without the radii of the balls, which would grow: what they hold, e^(At) only shrinks in ‖·‖_S.
     """
-    A = metric.A
-    now, ends, off, dropped = matrix(np.eye(A.nrows())), [np.eye(A.nrows())], 0.0, 0.0
+    A, now, off = metric.A, start, 0.0
+    ends = [rounded(start)[0]]
     S_size = float(np.linalg.norm(metric.S)) * (1 + EPS)
     steps: dict[tuple[int, int], arb_mat] = {}  # e^(AΔ) by Δ's numerator and denominator
     for p, count in zip(pieces, counts(pieces, metric), strict=True):
@@ -117,7 +126,7 @@ def decay(metric: Metric, pieces: tuple[Piece, ...]) -> Decay:
             off = max(off, rest)
         dropped += S_size * above(sum((v.rad() for v in now.entries()), arb(0)))
         now = now.mid()
-    off += float(np.linalg.norm(metric.reach)) * dropped * (1 + 1e-9)
+    off = max(off, rounded(start)[1]) + float(np.linalg.norm(metric.reach)) * dropped * (1 + 1e-9)
     values, width = np.array(ends), widths(pieces, metric)
     distinct, where = np.unique(width, return_inverse=True)
     A_size = arb_mat(A.nrows(), A.ncols(), [abs(v) for v in A.entries()])
@@ -125,7 +134,7 @@ def decay(metric: Metric, pieces: tuple[Piece, ...]) -> Decay:
     second = np.abs(rounded(A * A)[0] @ values[:-1])
     second += 1e-9 * second.max()  # its rounding, with much to spare
     curve = (second @ spread) * (width**2 / 8)[:, None, None] * (1 + 1e-9)
-    return Decay(width, values, curve, off)
+    return Decay(width, values, curve, off), now, dropped * (1 + 1e-9)
 
 
 def counts(pieces: Sequence[Piece], metric: Metric) -> list[int]:
@@ -186,11 +195,18 @@ def largest_of_parts(values: Array) -> Array:
 
 def errors(tube: Tube, metric: Metric, norm: Norm) -> Array:
     """sup N(e) over each of the cells of `decay`, from finer ones in it."""
+    if norm.largest:
+        return np.asarray(errors_by_rows(tube, metric, norm).max(axis=1))
     found, c = [], metric.of(norm)
     for values, bend, V in finely(tube, metric, norm):
-        sizes = np.abs(values).max(axis=1) if norm.largest else np.sqrt((values**2).sum(axis=1))
-        curved = bend.max() if norm.largest else np.sqrt((bend**2).sum())
-        found.append(sizes.max(axis=1) + curved + c * V)
+        found.append(np.sqrt((values**2).sum(axis=1).max(axis=1)) + np.sqrt((bend**2).sum()) + c * V)
+    return np.concatenate(found) * (1 + EPS)
+
+
+def errors_by_rows(tube: Tube, metric: Metric, norm: Norm) -> Array:
+    """sup |(T e)_i| (N, n) over each of the cells of `decay`, from finer ones in it."""
+    c = metric.rows(norm.T)
+    found = [np.abs(values).max(axis=2) + bend + c * V for values, bend, V in finely(tube, metric, norm)]
     return np.concatenate(found) * (1 + EPS)
 
 
@@ -211,10 +227,17 @@ def sampled(coefficients: Array, cells: int, sizes: Array | None = None, begin: 
     sizes : of the coefficients before they were combined, for the rounding of the combination.
     """
     k = np.arange(coefficients.shape[1])
-    powers = np.linspace(begin, 1.0, cells + 1)[None, :] ** k[:, None]
     sizes = np.abs(coefficients) if sizes is None else sizes
     second = (sizes * k * (k - 1)).sum(axis=1)
-    return coefficients @ powers, second * (1.0 - begin) ** 2 / (8.0 * cells**2) + EPS * sizes.sum(axis=1)
+    return coefficients @ _powers(len(k), cells, begin), second * (1.0 - begin) ** 2 / (
+        8.0 * cells**2
+    ) + EPS * sizes.sum(axis=1)
+
+
+@cache
+def _powers(count: int, cells: int, begin: float) -> Array:
+    """Powers (count, cells + 1) of the ends of cells that divide what lies between `begin` and 1; not to be written."""
+    return np.asarray(np.linspace(begin, 1.0, cells + 1)[None, :] ** np.arange(count)[:, None])
 
 
 def errors_of_states(tube: Tube, metric: Metric) -> Array:
@@ -226,11 +249,20 @@ def errors_of_states(tube: Tube, metric: Metric) -> Array:
     return np.max(found, axis=0) * (1 + EPS)
 
 
-def outputs(system: ExactSystem, tube: Tube, metric: Metric, functions: Outputs) -> tuple[Array, Array]:
-    """Smallest and largest value (k,) of the outputs functions(x, w, sin, cos) along x, over all pieces."""
-    low, high = [], []
-    for piece, V in zip(tube.pieces, tube.full, strict=True):
-        centres, rest = enclosed_series(system, piece, functions, metric.reach * V)
+def outputs(
+    system: ExactSystem, tube: Tube, metric: Metric, functions: Outputs, wider: Array | None = None
+) -> tuple[Array, Array]:
+    """Smallest and largest value (k,) of the outputs functions(x, w, sin, cos) along x, over all pieces.
+
+    wider : (N, n + m), how far x and w may be off besides, over the cells of `decay`.
+    """
+    low, high, cell = [], [], 0
+    for piece, count, V in zip(tube.pieces, counts(tube.pieces, metric), tube.full, strict=True):
+        off = np.pad(metric.reach * V, (0, system.m))
+        if wider is not None:
+            off += wider[cell : cell + count].max(axis=0)
+            cell += count
+        centres, rest = enclosed_series(system, piece, functions, off * (1 + EPS))
         values, bend = sampled(centres, FINE, begin=-1.0)
         low.append((values - bend[:, None]).min(axis=1) - rest)
         high.append((values + bend[:, None]).max(axis=1) + rest)

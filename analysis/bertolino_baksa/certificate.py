@@ -12,7 +12,7 @@ import json
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any, TypeVar
+from typing import Any, Protocol, TypeVar
 
 import numpy as np
 from flint import fmpq
@@ -21,9 +21,9 @@ from ..errors import InputError
 from . import strict
 from .balls import Array, ExactSystem, NotProvedError, precision
 from .norms import Norm, proved_metric
+from .pieces import Piece
 from .proof import Proof, prove
 from .taylor import find_pieces
-from .tube import Piece
 
 FORMAT = 1
 ROWS = 24  # of a table δ(ε)
@@ -108,7 +108,17 @@ def motion(pieces: Sequence[Piece], points: int = 9) -> Array:
     return np.concatenate([p.linear @ tau ** np.arange(p.linear.shape[1])[:, None] for p in pieces], axis=1)
 
 
-def claim_of(proof: Proof, norm: Norm, floor: float, scale: float) -> Claim:
+class Proved(Protocol):
+    """What a table of δ(ε) is made from; see `Proof`."""
+
+    def epsilon(self, norm: Norm, delta: Array) -> Array: ...
+
+    def bounded(self, norm: Norm, delta: float) -> bool: ...
+
+    def carried(self, norm: Norm) -> float: ...
+
+
+def claim_of(proof: Proved, norm: Norm, floor: float, scale: float) -> Claim:
     """The table with the largest δ that is found; its smallest δ raises the floor by but FIRST of it.
 
     floor : what is proved of δ = 0.
@@ -118,7 +128,7 @@ def claim_of(proof: Proof, norm: Norm, floor: float, scale: float) -> Claim:
     floor = max(floor, FLOOR * scale)
     if not floor < np.inf:
         raise NotProvedError(f"no bound for all t in the {norm.name} norm")
-    first = FIRST * floor / float(proof.decay.of(norm).max())
+    first = FIRST * floor / proof.carried(norm)
     top = _largest(proof, norm, first)
     while True:  # once more: all together
         delta = np.geomspace(first, top, ROWS) * (1.0 - MARGIN)
@@ -131,7 +141,7 @@ def claim_of(proof: Proof, norm: Norm, floor: float, scale: float) -> Claim:
     return Claim(norm, np.stack([np.maximum.accumulate(epsilon) * (1.0 + MARGIN), delta], axis=1))
 
 
-def _largest(proof: Proof, norm: Norm, first: float) -> float:
+def _largest(proof: Proved, norm: Norm, first: float) -> float:
     """A δ ≥ first that is proved, while one at most 1/CLOSE times as large is not (or is above HUGE): by halving."""
     if not proof.bounded(norm, first):
         raise NotProvedError(f"no delta > 0 in the {norm.name} norm")
@@ -239,10 +249,10 @@ def certificate_of(content: dict[str, Any]) -> Certificate:
     return Certificate(model, x0, S, pieces_of(content["pieces"], len(x0)), claims)
 
 
-def pieces_of(values: Any, n: int) -> tuple[Piece, ...]:
+def pieces_of(content: Any, n: int) -> tuple[Piece, ...]:
     """Pieces of n states from plain data; raises ValueError where they cannot be."""
     pieces = []
-    for p in values:
+    for p in content:
         strict.of_keys(p, ("begin", "end", "x_lin", "e"))
         linear, error = strict.numbers(p["x_lin"], 2), strict.numbers(p["e"], 2)
         if not (linear.shape == error.shape and len(linear) == n and 2 <= linear.shape[1] <= 100):
@@ -258,18 +268,37 @@ def pieces_of(values: Any, n: int) -> tuple[Piece, ...]:
 
 def system_of(content: dict[str, Any], n: int) -> tuple[Array, dict[str, Any], tuple[Claim, ...]]:
     """Metric, model and claims of n states from plain data; raises ValueError where they cannot be."""
+    return square(content["metric"], n), model_in(content), claims_of(content["claims"], n)
+
+
+def square(content: Any, n: int) -> Array:
+    """A matrix of n states from plain data; raises ValueError for any other."""
+    found = strict.numbers(content, 2)
+    if found.shape != (n, n):
+        raise ValueError(f"wanted a matrix of {n} states, got the shape {found.shape}")
+    return found
+
+
+def model_in(content: dict[str, Any]) -> dict[str, Any]:
+    """The model; raises ValueError if it is no object."""
+    model = content["model"]
+    if not isinstance(model, dict):
+        raise ValueError("wanted a model")
+    return model
+
+
+def claims_of(content: Any, n: int) -> tuple[Claim, ...]:
+    """Claims of n states from plain data, one at least; raises ValueError where they cannot be."""
     claims = []
-    for c in content["claims"]:
+    for c in content:
         norm = strict.of_keys(strict.of_keys(c, ("norm", "l", "delta of eps"))["norm"], ("name", "largest", "T"))
         rows = [strict.of_keys(row, ("eps", "delta")) for row in c["delta of eps"]]
         table, floor = strict.numbers([[row["eps"], row["delta"]] for row in rows], 2), strict.numbers(c["l"], 0)
         if not (np.all(np.diff(table, axis=0) >= 0.0) and table[0, 1] > 0.0 and table[0, 0] == floor):
             raise ValueError("delta(eps) must rise, from l and a delta > 0 on")
-        T = strict.numbers(norm["T"], 2)
-        if T.shape != (n, n):
-            raise ValueError(f"a norm has the shape {T.shape}")
-        claims.append(Claim(Norm(strict.text(norm["name"]), T, strict.truth(norm["largest"])), table))
-    S = strict.numbers(content["metric"], 2)
-    if S.shape != (n, n) or not claims or not isinstance(content["model"], dict):
-        raise ValueError("wanted a metric of the states, claims and a model")
-    return S, content["model"], tuple(claims)
+        claims.append(
+            Claim(Norm(strict.text(norm["name"]), square(norm["T"], n), strict.truth(norm["largest"])), table)
+        )
+    if not claims:
+        raise ValueError("wanted claims")
+    return tuple(claims)

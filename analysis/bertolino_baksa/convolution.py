@@ -28,13 +28,13 @@ class Convolution:
         """Of the windows [s]."""
         return self.width * np.arange(self.kernel.shape[1] // self.n + 1)
 
-    def __call__(self, forced: Array) -> Array:
-        """Bounds (windows, p) of the integral, for f within forced (N, n) over the cells."""
-        edges, n = self.edges, self.n
+    def __call__(self, forced: Array, rows: int | None = None) -> Array:
+        """Bounds (windows, p) of the integral, for f within forced (N, n) over the cells; or of its first rows only."""
+        edges, n, kernel = self.edges, self.n, self.kernel[:rows]
         f = largest_over(self.ends, forced, edges[:-1], edges[1:])
         back, count = f[::-1].ravel(), len(f)
-        rows = [self.kernel[:, : (k + 1) * n] @ back[(count - 1 - k) * n :] for k in range(count)]
-        return np.stack(rows) * (self.width * SLACK)
+        found = [kernel[:, : (k + 1) * n] @ back[(count - 1 - k) * n :] for k in range(count)]
+        return np.stack(found) * (self.width * SLACK)
 
     def by_cells(self, found: Array) -> Array:
         """Bounds (N, …) over the cells from bounds (windows, …)."""

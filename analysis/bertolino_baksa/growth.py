@@ -2,7 +2,8 @@
 
     q' = A q + R(x + y, w) − R(x, w),  q(0) = 0:     v' = −α v + ‖ΔR̄(|x|, κ_j δ + n_j v)‖_S  keeps  ‖q‖_S ≤ v
 
-for all y(0) with N(y(0)) ≤ δ. Many δ at once.
+for all y(0) with N(y(0)) ≤ δ. Many δ at once. Where A changes in time, e^(At) is the flow of y' = A(t) y, and −α is the
+logarithmic norm μ(t) of A(t), which may be > 0.
 """
 
 from __future__ import annotations
@@ -21,28 +22,31 @@ ROOM = 1e-9  # relative: for roundings where v is hardly forced
 
 
 def perturbed(
-    metric: Metric, bound: Majorant, widths: Array, X: Array, spread: Array, v0: Array
+    metric: Metric, bound: Majorant, widths: Array, X: Array, spread: Array, v0: Array, rates: Array | None = None
 ) -> tuple[Array, Array]:
     """v over each cell (N, K) and at the end (K,); inf where no bound is found.
 
     widths : of the cells (N,) [s].  X : bounds (N, n + m) of (x, w) over them.
     spread : bounds (N, n + m, K) over the cells of what is known without R: of |y − q|, and of changes of w.
     v0     : ‖q‖_S at the begin (K,).
+    rates  : μ over the cells (N,) [1/s]; −α if not given.
     """
     n, S = len(metric.S), np.abs(metric.S)
     v, largest = np.array(v0, dtype=float), np.full((len(X), len(v0)), np.inf)
-    at_X = bound(X.T).T
+    at_X = bound(X.T)
     reach = np.concatenate([metric.reach, np.zeros(X.shape[1] - n)])[:, None]
 
     def forcing(cell: int, size: Array) -> Array:
-        change = bound.change(X[cell], at_X[cell], spread[cell] + reach * size)
+        change = bound.change(X[cell][:, None], at_X[:, cell : cell + 1], spread[cell] + reach * size)
         return np.sqrt(((S @ change) ** 2).sum(axis=0)) * (1.0 + 1e-12)
 
     pushed = np.zeros(len(v0))
-    for cell, width in enumerate(widths.tolist()):
-        top, pushed = _held(partial(forcing, cell), v, width, pushed)
+    mu = np.full(len(widths), -metric.alpha) if rates is None else rates
+    for cell, (width, factor) in enumerate(zip(widths.tolist(), np.exp(mu * widths).tolist(), strict=True)):
+        most = max(factor, 1.0)  # of what A alone makes of v, within the cell
+        top, pushed = _held(partial(forcing, cell), v * most, width * most, pushed)
         largest[cell] = top
-        v = (v * np.exp(-metric.alpha * width) + width * pushed) * (1.0 + 1e-12)
+        v = (v * factor + width * most * pushed) * (1.0 + 1e-12)
         v[~np.isfinite(top)] = np.inf
         if not np.isfinite(v).any():
             break

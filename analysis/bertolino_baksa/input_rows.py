@@ -1,7 +1,8 @@
 """Inputs whose heights u are known at rows only: polynomials near them, and how far those of a class may be off.
 
 w = (u, u'): the first half of the inputs are heights, the second half their rates. Between two rows a height of class
-`curv` has |u''| ≤ bound, so that its corners lie at rows; one of class `lip` has |u'| ≤ bound. What a class leaves open
+`curv` has a rate that is Lipschitz, |u''| ≤ bound, so that its corners lie at rows; one of class `lip` is Lipschitz
+itself, |u'| ≤ bound. What a class leaves open
 lies around the chord from row to row. A polynomial near many chords is open by its distance to them too, but a motion
 can be followed along it in steps of its own, however close the rows.
 """
@@ -11,7 +12,8 @@ from __future__ import annotations
 from bisect import bisect_left
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import cached_property, partial
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -25,6 +27,7 @@ DEGREE = 8  # of a window's polynomials
 NEAR, BENT = 0.1, 1.1  # of what a class leaves open: how far a window's rows, and its bows, may be off
 SCALE = 1e-9  # of the largest height: what is near where a class leaves nothing open
 LONGEST = 0.25  # s
+RANGE = 1e30  # of times, heights and bound, so that no float overflows
 SLACK = 1.0 + 1e-9
 EPS = 1e-13  # relative: covers the roundings of a polynomial's value, over the sum of its terms' sizes
 
@@ -37,7 +40,7 @@ class RowClass:
     bound: float
 
     def __str__(self) -> str:
-        return f"{self.kind}:{self.bound:g}"
+        return f"{self.kind}:{self.bound!r}"
 
     def between(self, steps: Array, slopes: Array, loose: Array) -> tuple[Array, Array, Array]:
         """(N, k) each: how far heights may be off the chords of these steps [s] and slopes [m/s], at most and on the
@@ -57,7 +60,7 @@ class RowClass:
         return self.bound * (steps**2 / 8.0 if self.kind == "curv" else steps / 2.0)
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class InputRows:
     """Heights (N, k) at times (N,) [s] that rise from 0 on, exact as printed, and the class of all between them."""
 
@@ -70,11 +73,25 @@ class InputRows:
             raise ValueError("wanted at least two times, rising from 0 on")
         if self.heights.ndim != 2 or len(self.heights) != len(self.times):
             raise ValueError(f"wanted heights at {len(self.times)} times, got the shape {self.heights.shape}")
+        largest = max(self.times[-1], np.abs(self.heights).max(), self.between.bound, 1.0 / self.steps.min())
+        if not largest <= RANGE:
+            raise ValueError(f"wanted times, heights, bound and 1/step up to {RANGE:g}, got {largest:g}")
+
+    @cached_property
+    def steps(self) -> Array:
+        """From time to time (N − 1,) [s], of the exact times."""
+        exact = [decimal(t) for t in self.times.tolist()]
+        return np.array([float(b - a) for a, b in pairwise(exact)])
 
     @property
     def slopes(self) -> Array:
         """Of the chords (N − 1, k)."""
-        return np.diff(self.heights, axis=0) / np.diff(self.times)[:, None]
+        return np.asarray(np.diff(self.heights, axis=0) / self.steps[:, None])
+
+    def until(self, t: float) -> InputRows:
+        """The rows up to the first one at t or later."""
+        last = min(int(np.searchsorted(self.times, t)) + 1, len(self.times))
+        return InputRows(self.times[:last], self.heights[:last], self.between)
 
     def refuse_steep(self) -> None:
         """Raise NotProvedError where no height of the class takes the rows' values."""
@@ -108,14 +125,23 @@ def windows(rows: InputRows) -> list[Window]:
 
 
 def _fitted(rows: InputRows, first: int, last: int) -> Window:
-    t = rows.times[first : last + 1]
+    """The chord and (1 − σ²) times a polynomial, near the heights between: at its ends a window is off by rounding."""
+    t, u = rows.times[first : last + 1], rows.heights[first : last + 1]
     sigma = (2.0 * t - t[0] - t[-1]) / (t[-1] - t[0])
-    coefficients = np.polynomial.polynomial.polyfit(sigma, rows.heights[first : last + 1], min(DEGREE, last - first))
-    return Window(first, last, np.asarray(coefficients.T))
+    chord, bell = np.stack([u[0] + u[-1], u[-1] - u[0]]) / 2.0, np.array([1.0, 0.0, -1.0])
+    found = np.zeros((min(DEGREE, last - first) + 1, u.shape[1]))
+    found[:2] = chord
+    if last - first > 1:
+        inner = 1.0 - sigma[1:-1] ** 2
+        rest = (u - chord[0] - sigma[:, None] * chord[1])[1:-1]
+        powers = inner[:, None] * sigma[1:-1, None] ** np.arange(len(found) - 2)
+        for column, more in zip(found.T, np.linalg.lstsq(powers, rest)[0].T, strict=True):
+            column += np.convolve(bell, more)
+    return Window(first, last, found.T.copy())
 
 
 def _near(rows: InputRows, window: Window) -> bool:
-    steps = np.diff(rows.times[window.first : window.last + 1])[:, None]
+    steps = rows.steps[window.first : window.last, None]
     room = np.maximum(rows.between.widest(steps), SCALE * np.abs(rows.heights).max())
     off, bend = _beside(rows, window)
     return bool(
@@ -145,17 +171,17 @@ def looseness(rows: InputRows, found: Sequence[Window]) -> Loose:
     On a step of length s the chord of the polynomial is as far off that of the heights as at the rows, and the
     polynomial leaves its chord by s²/8, on the average by s²/12, its rate by s/2 times its second derivative.
     """
-    peaks, means = [], []
+    peaks, means, jumps = [], [], np.zeros(rows.heights.shape[1])
     for window in found:
-        steps = np.diff(rows.times[window.first : window.last + 1])
+        steps = rows.steps[window.first : window.last]
         peak, mean, rate = rows.between.between(steps, rows.slopes[window.first : window.last], np.zeros(1))
         off, bend = _beside(rows, window)
         chords, s = np.maximum(off[:-1], off[1:]), steps[:, None]
         rates = rate + (off[:-1] + off[1:]) / s + bend * s / 2.0
         peaks.append(np.hstack([peak + chords + bend * s**2 / 8.0, rates]).max(axis=0))
-        means.append(np.hstack([mean + chords + bend * s**2 / 12.0, rates]).max(axis=0))
-    longest = float(np.diff(rows.times).max()) * SLACK
-    return Loose(np.array(peaks) * SLACK, np.array(means) * SLACK, longest)
+        means.append((mean + chords + bend * s**2 / 12.0).max(axis=0))
+        jumps += off[0] + off[-1]
+    return Loose(np.array(peaks) * SLACK, np.array(means) * SLACK, jumps * SLACK, float(rows.steps.max()) * SLACK)
 
 
 def on_windows(system: ExactSystem, rows: InputRows, found: Sequence[Window]) -> ExactSystem:

@@ -13,7 +13,7 @@ from __future__ import annotations
 import numpy as np
 
 from .balls import Array
-from .cells import EPS, Decay, errors, finely
+from .cells import EPS, Decay, errors, errors_by_rows, finely
 from .norms import Metric, Norm
 from .tube import Tube
 
@@ -30,24 +30,23 @@ def largest(tube: Tube, metric: Metric, decay: Decay, norm: Norm, delta: Array, 
 
 
 def _by_rows(tube: Tube, metric: Metric, decay: Decay, norm: Norm, delta: Array, q: Array) -> Array:
-    most = np.zeros_like(q)
-    for row, kappa in zip(norm.T, decay.rows(norm, norm.T).T, strict=True):
-        one = Norm("a row", row[None, :], largest=True)
-        size = errors(tube, metric, one)[:, None] + kappa[:, None] * delta + metric.of(one) * q
-        most = np.maximum(most, size * (1 + EPS))
-    return most
+    e, kappa, c = errors_by_rows(tube, metric, norm), decay.rows(norm, norm.T), metric.rows(norm.T)
+    sizes = e[:, :, None] + kappa[:, :, None] * delta + c[:, None] * q[:, None, :]
+    return np.asarray(sizes.max(axis=1) * (1 + EPS))
 
 
 def _by_ends(tube: Tube, metric: Metric, decay: Decay, norm: Norm, delta: Array) -> Array:
     """Bounds (N, K) of ‖T e + M z‖ over each cell from those at its ends."""
     moved, curve, off = decay.turned(norm)
-    ends, leaves = _chords(tube, metric, decay, norm)
-    at = np.maximum(*(furthest(e, m, delta) for e, m in zip(ends, (moved[:-1], moved[1:]), strict=True)))
+    (begins, stops), leaves = _chords(tube, metric, norm)
+    at = furthest(np.concatenate([begins, stops[-1:]]), moved, delta)
+    gaps = np.append(np.sqrt(((begins[1:] - stops[:-1]) ** 2).sum(axis=1)), 0.0)  # of T e, from piece to piece
+    at = np.maximum(at[:-1], at[1:] + gaps[:, None])
     bend = np.sqrt((curve**2).sum(axis=(1, 2))) + off
     return np.asarray((at + leaves[:, None] + bend[:, None] * delta) * (1 + EPS))
 
 
-def _chords(tube: Tube, metric: Metric, decay: Decay, norm: Norm) -> tuple[Array, Array]:
+def _chords(tube: Tube, metric: Metric, norm: Norm) -> tuple[Array, Array]:
     """T e's polynomials at the begin and the end of each cell (2, N, n), and how far (N,) T e may leave the chord."""
     ends, leaves, c = [], [], metric.of(norm)
     for values, bend, V in finely(tube, metric, norm):  # (n, parts + 1) of each cell

@@ -109,14 +109,17 @@ class Majorant:
         return self.signed @ self._products(y)
 
     def _products(self, y: Array) -> Array:
-        return np.asarray(np.multiply.reduce(self._factors(y), axis=1))
-
-    def _factors(self, y: Array) -> Array:
-        return np.asarray(np.concatenate([y, np.ones((1, y.shape[1]))])[self.monomials])
+        factors = np.concatenate([y, np.ones((1, y.shape[1]))])
+        first, *others = self.monomials.T
+        products = factors[first]
+        for each in others:
+            products *= factors[each]
+        return products
 
     def _derivatives(self, coefficients: Array, y: Array) -> Array:
         """∂/∂y (n, n + m, K) of the polynomials with these coefficients (n, M) at y (n + m, K), the tail left out."""
-        factors, found = self._factors(y), np.zeros((len(coefficients), *y.shape))
+        factors = np.concatenate([y, np.ones((1, y.shape[1]))])[self.monomials]
+        found = np.zeros((len(coefficients), *y.shape))
         for k in range(ORDER):
             others = np.multiply.reduce(np.delete(factors, k, axis=1), axis=1)
             of = self.monomials[:, k] == np.arange(len(y))[:, None]
@@ -131,10 +134,10 @@ class Majorant:
     def change(self, X: Array, at_X: Array, Y: Array) -> Array:
         """Bound (n, K) of |R(x + y, w) − R(x, w)|, inf out of the box.
 
-        X (n + m,) bounds (x, w), Y (n + m, K) bounds (y, 0); at_X (n,) is R̄(X).
+        X (n + m, K or 1) bounds (x, w), Y (n + m, K) bounds (y, 0); at_X (n, K or 1) is R̄(X).
         """
-        far = X[:, None] + Y
-        return (self(far) * (1.0 + SLACK) - at_X[:, None] * (1.0 - SLACK) + self.tail(far, Y)) * (1.0 + SLACK)
+        far = X + Y
+        return (self(far) * (1.0 + SLACK) - at_X * (1.0 - SLACK) + self.tail(far, Y)) * (1.0 + SLACK)
 
     def change_near(self, middle: Array, radius: Array, Y: Array) -> Array:
         """Bound (n, K) of |R(z + y) − R(z)| for |z − middle| ≤ radius and |y| ≤ Y (n + m, K), inf out of the box.

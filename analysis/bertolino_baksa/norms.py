@@ -53,21 +53,34 @@ class Metric:
         """n_j ≥ |x_j|/‖x‖_S (n,)."""
         return np.sqrt((magnitudes(self.inverse) ** 2).sum(axis=1)) * (1.0 + 1e-14)
 
+    @cached_property
+    def balls(self) -> arb_mat:
+        """S, exactly."""
+        return matrix(self.S)
+
+    def rows(self, T: Array) -> Array:
+        """c_i ≥ |(T x)_i|/‖x‖_S (p,); T (p, n) exact."""
+        return np.sqrt((magnitudes(matrix(T) * self.inverse) ** 2).sum(axis=1)) * (1.0 + 1e-14)
+
+    @property
+    def norm(self) -> Norm:
+        """‖·‖_S."""
+        return Norm("a metric's", self.S)
+
     def of(self, norm: Norm) -> float:
         """c ≥ N(x)/‖x‖_S."""
-        product = matrix(norm.T) * self.inverse
         if norm.largest:
-            return float(np.sqrt((magnitudes(product) ** 2).sum(axis=1)).max() * (1.0 + 1e-14))
-        centre, radius = rounded(product)
+            return float(self.rows(norm.T).max())
+        centre, radius = rounded(matrix(norm.T) * self.inverse)
         return float(two_norm(centre)) + radius
 
     def size(self, m: arb_mat) -> float:
         """Bound of ‖m‖_S as an operator, by Frobenius."""
-        return length((matrix(self.S) * m * self.inverse).entries())
+        return length((self.balls * m * self.inverse).entries())
 
     def length(self, x: arb_mat) -> float:
         """Bound of ‖x‖_S of a column of balls."""
-        return length((matrix(self.S) * x).entries())
+        return length((self.balls * x).entries())
 
     def longest(self, bounds: Array) -> float:
         """Bound of ‖x‖_S for |x_j| ≤ bounds_j (n,)."""
@@ -114,17 +127,26 @@ def proved_metric(system: ExactSystem, S: Array) -> Metric:
 
     Raises NotProvedError if the linear part does not contract in it, or for entries too large or small for floats.
     """
-    if len(S) != system.n:
-        raise NotProvedError(f"another system: wanted {system.n} states, got {len(S)}")
     zero = [arb(0)]
-    A = jacobian(system, zero * system.n, zero * system.m)
+    return contracting(jacobian(system, zero * system.n, zero * system.m), S)
+
+
+def contracting(A: arb_mat, S: Array) -> Metric:
+    """The metric in which x' = A x contracts; raises NotProvedError as `proved_metric`."""
+    if S.shape != (A.nrows(), A.ncols()):
+        raise NotProvedError(f"another system: wanted {A.nrows()} states, got {len(S)}")
     inverse = usable_inverse(S, "metric")
-    turned = matrix(S) * A * inverse
-    symmetric = (turned + turned.transpose()) / 2
-    alpha = np.inf
-    for i in range(system.n):
-        others: Any = sum((abs(symmetric[i, j]) for j in range(system.n) if j != i), arb(0))
-        alpha = min(alpha, below(-symmetric[i, i] - others))
+    alpha = decay_rate(matrix(S) * A * inverse)
     if not alpha > 0.0:
         raise NotProvedError(f"the linear part does not contract: growth rate up to {-alpha:g} 1/s; wanted < 0")
-    return Metric(S, inverse, A, float(alpha))
+    return Metric(S, inverse, A, alpha)
+
+
+def decay_rate(turned: arb_mat) -> float:
+    """A rate at which ‖x‖₂ decays at least under x' = turned x, by Gershgorin's rows of the symmetric part."""
+    symmetric = (turned + turned.transpose()) / 2
+    alpha = np.inf
+    for i in range(symmetric.nrows()):
+        others: Any = sum((abs(symmetric[i, j]) for j in range(symmetric.nrows()) if j != i), arb(0))
+        alpha = min(alpha, below(-symmetric[i, i] - others))
+    return float(alpha)

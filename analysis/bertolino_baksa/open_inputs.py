@@ -1,9 +1,10 @@
-"""Inputs that are known but to within something, w = ŵ + η: what η makes of x_lin, and of e = x − x_lin.
+"""Heights and rates that are known but to within something, w = ŵ + (η, η'): what that makes of x_lin and of e.
 
-    x_lin[w] − x_lin[ŵ] = ζ,  ζ' = A ζ + B η:                  |ζ(t)| ≤ ∫₀ᵗ |e^(As) B| |η(t − s)| ds
-    e[w] − e[ŵ] = q,  q' = A q + R(x̂ + ζ + q, ŵ + η) − R(x̂, ŵ):    |q(t)| ≤ ∫₀ᵗ |e^(A(t − s))| |ΔR| ds
+    x_lin[w] − x_lin[ŵ] = ζ,  ζ' = A ζ + B_h η + B_r η':        ζ(t) = B_r η(t) + ∫₀ᵗ e^(As) (B_h + A B_r) η(t − s) ds
+    e[w] − e[ŵ] = q,  q' = A q + R(x̂ + ζ + q, w) − R(x̂, ŵ):    |q(t)| ≤ ∫₀ᵗ |e^(A(t − s))| |ΔR| ds
 
-so that e feels the linear part's freedom ζ, which is much larger, through R alone.
+ζ by parts, as η is small where η' is not, and without the jumps of η; so e feels the linear part's freedom ζ, which is
+much larger, through R alone.
 """
 
 from __future__ import annotations
@@ -11,8 +12,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from flint import arb_mat
 
-from .balls import Array, ExactSystem, NotProvedError, magnitudes
+from .balls import Array, ExactSystem, NotProvedError, magnitudes, rounded
 from .cells import Decay, counts, largest_of_parts, middles
 from .convolution import convolution
 from .growth import perturbed
@@ -26,11 +28,16 @@ SLACK = 1.0 + 1e-9
 
 @dataclass(frozen=True, slots=True)
 class Loose:
-    """How far w may be off, windows one after the other: (windows, m) at most, and on the average of each step, none of
-    which is longer than `step` [s]."""
+    """How far w may be off, windows one after the other.
+
+    peak  : (windows, m), of heights and rates, at most.
+    mean  : (windows, m/2), of heights on the average of each step, none of which is longer than `step` [s].
+    jumps : (m/2,), the sizes of all jumps of η, that at the begin among them, in all.
+    """
 
     peak: Array
     mean: Array
+    jumps: Array
     step: float
 
 
@@ -76,20 +83,24 @@ def opened(system: ExactSystem, metric: Metric, tube: Tube, flow: Decay, X: Arra
 
 
 def _linear(system: ExactSystem, metric: Metric, tube: Tube, flow: Decay, loose: Loose) -> Array:
-    """Bounds (N, n) of |ζ| over the cells, by the most that w was off so far.
+    """Bounds (N, n) of |ζ| over the cells, by the most that heights were off so far.
 
-    With K = |e^(As) B|, over a step ∫ K |η| ≤ sup K · step · mean. The sum of K's suprema times the steps is ∫ K but
-    for a step times its variation and, where t lies within a step, its largest value.
+    With K = |e^(As) (B_h + A B_r)|, over a step ∫ K |η| ≤ sup K · step · mean. The sum of K's suprema times the steps
+    is ∫ K but for a step times its variation and, where t lies within a step, its largest value.
     """
-    B, one = input_matrix(system), np.eye(system.n)
+    half, one, rows = system.m // 2, np.eye(system.n), input_matrix(system).tolist()
+    B_h, B_r = (arb_mat([row[k : k + half] for row in rows]) for k in (0, half))
+    driving = B_h + metric.A * B_r
     peak, mean = (
         np.maximum.accumulate(np.repeat(off, counts(tube.pieces, metric), axis=0), axis=0)
-        for off in (loose.peak, loose.mean)
+        for off in (loose.peak[:, :half], loose.mean)
     )
-    over, varied = (np.cumsum(flow.by_cells(one, right), axis=0) for right in (B, metric.A * B))
-    stepped = over + loose.step * (2.0 * varied + magnitudes(B))
-    by_peak, by_mean = (np.einsum("cnm,cm->cn", k, off) for k, off in ((over, peak), (stepped, mean)))
-    return np.asarray(np.minimum(by_peak, by_mean) * SLACK)
+    over, varied = (np.cumsum(flow.by_cells(one, right), axis=0) for right in (driving, metric.A * driving))
+    stepped = over + loose.step * (2.0 * varied + magnitudes(driving))
+    by_peak, by_mean = (np.einsum("cnk,ck->cn", K, off) for K, off in ((over, peak), (stepped, mean)))
+    own = np.abs(rounded(B_r)[0]) * SLACK
+    jumps = (flow.sizes(one).max(axis=0) @ own) @ loose.jumps
+    return np.asarray((np.minimum(by_peak, by_mean) + peak @ own.T + jumps) * SLACK)
 
 
 def _changed(system: ExactSystem, metric: Metric, tube: Tube, bound: Majorant, wider: Array) -> Array:

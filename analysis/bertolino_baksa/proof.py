@@ -8,7 +8,7 @@ input that is not known exactly, `open_inputs` bounds what that changes, until t
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -71,10 +71,11 @@ class Proof:
 
     def bounded(self, norm: Norm, delta: float) -> bool:
         """Whether ε(δ) is finite, without what that takes no part in."""
-        try:
-            return bool(all(np.isfinite(found).all() for found in self._rest(norm, np.array([delta]))))
-        except NotProvedError:
-            return False
+        return finite(lambda: self._rest(norm, np.array([delta])))
+
+    def carried(self, norm: Norm) -> float:
+        """κ ≥ N(e^(At) y)/N(y) over all cells."""
+        return float(self.decay.of(norm).max())
 
     def _rest(self, norm: Norm, delta: Array) -> tuple[Array, Array]:
         """Bounds (N, K) of ‖y − e^(At) y(0)‖_S over the cells, and (K,) of N(e + y) after the last piece."""
@@ -110,11 +111,24 @@ class Proof:
     @property
     def ends(self) -> tuple[float, float]:
         """Bounds of ‖x‖_S and ‖e‖_S at the end of the last piece."""
-        last = self.tube.pieces[-1]
-        x = self.metric.length(at_end(last.linear) + at_end(last.error))
-        e = self.metric.length(at_end(last.error))
-        _, V, V_e = self.tube.at_end
-        return (x + V) * (1.0 + 1e-15), (e + V_e) * (1.0 + 1e-15)
+        return ends_of(self.tube, self.metric)
+
+
+def finite(found: Callable[[], Sequence[Array]]) -> bool:
+    """Whether all that is found is finite; not if there is no proof of it."""
+    try:
+        return all(bool(np.isfinite(each).all()) for each in found())
+    except NotProvedError:
+        return False
+
+
+def ends_of(tube: Tube, metric: Metric) -> tuple[float, float]:
+    """Bounds of ‖x‖_S and ‖e‖_S at the end of the tube's last piece."""
+    last = tube.pieces[-1]
+    x = metric.length(at_end(last.linear) + at_end(last.error))
+    e = metric.length(at_end(last.error))
+    _, V, V_e = tube.at_end
+    return (x + V) * (1.0 + 1e-15), (e + V_e) * (1.0 + 1e-15)
 
 
 def prove(system: ExactSystem, metric: Metric, pieces: Sequence[Piece], x0: Sequence[float]) -> Proof:

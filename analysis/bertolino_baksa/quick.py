@@ -21,9 +21,10 @@ from .convolution import convolution
 from .growth import perturbed
 from .majorant import Majorant, majorant
 from .norms import Metric, Norm
+from .pieces import Piece
 from .proof import rest_growth
 from .taylor import find_pieces
-from .tube import Piece, at_end, prove_linear
+from .tube import at_end, prove_linear
 
 ROOM, SHARE = 2.0, 0.1  # of the box, over x_lin's sizes, and over what a motion of its size could be in each state
 PASSES = 2  # of the integral, each with the bounds of e that the last one gave
@@ -75,10 +76,9 @@ def _states(bound: Majorant, X: Array, along: Array, e: Array, flow: Decay, left
 
     X, along : bounds (N, n + m) of (x_lin, w) and (N, n) of R there, over the cells.  e : bounds (N, n) of |e|.
     """
-    gathered, at_X, n = convolution(flow, np.concatenate(lefts)), bound(X.T).T, e.shape[1]
-    for _ in range(PASSES):
+    gathered, at_X, n = convolution(flow, np.concatenate(lefts)), bound(X.T), e.shape[1]
+    for only in (n,) * (PASSES - 1) + (None,):  # the states alone, but in the last pass
         moved = np.pad(e, ((0, 0), (0, X.shape[1] - n)))
-        more = [bound.change(x, at, y[:, None])[:, 0] for x, at, y in zip(X, at_X, moved, strict=True)]
-        found = gathered(along + np.array(more))
+        found = gathered(along + bound.change(X.T, at_X, moved.T).T, only)
         e = np.minimum(e, gathered.by_cells(found[:, :n]))
     return np.split(found, len(lefts), axis=1)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -26,21 +26,20 @@ from .certificate import (
 )
 from .input_rows import InputRows, RowClass, Window, looseness, on_windows, windows
 from .norms import proved_metric
-from .open_inputs import Loose
 from .proof import Proof, prove_open
 from .taylor import find_pieces
 from .tube import Piece
 
 KIND = "inputs known at rows"
 THEOREM = (
-    "Let T be the last of the times, and w = (u, u') any inputs of x' = F(x, w(t)) on 0 <= t <= T, their first half u "
-    "continuous with the heights of the rows at the times and, between two of these, with |u''| <= bound almost "
-    "everywhere and u' continuous where the class is 'curv', with |u'| <= bound almost everywhere where it is 'lip'. "
-    "Let psi = x_lin be the solution of the linear part x' = A x + B w(t) under this w, with psi(0) = x0. For every "
-    "eps >= l let delta(eps) be the largest delta of the table whose eps is not above it. Then, whatever w, every "
-    "solution x with N(x(0) - psi(0)) < delta(eps) satisfies N(x(t) - psi(t)) < eps for all 0 <= t <= T (definition "
-    "2.1, Bertolino and Baksa, as far as w is known). N(x) = |T x|_2, or max |(T x)_i| where the norm says so; all "
-    "numbers are SI and exact as printed."
+    "Let T be the last of the times, and w = (u, u') any inputs of x' = F(x, w(t)) on 0 <= t <= T of which the first "
+    "half, u, takes the heights of the rows at the times and is, from each time to the next, Lipschitz with the bound, "
+    "|u(s) - u(t)| <= bound |s - t|, where the class is 'lip', and differentiable with a derivative that is Lipschitz "
+    "with the bound where it is 'curv'. Let psi = x_lin be the solution of the linear part x' = A x + B w(t) under "
+    "this w, with psi(0) = x0. For every eps >= l let delta(eps) be the largest delta of the table whose eps is not "
+    "above it. Then, whatever w, every solution x with N(x(0) - psi(0)) < delta(eps) satisfies N(x(t) - psi(t)) < eps "
+    "for all 0 <= t <= T (definition 2.1, Bertolino and Baksa, as far as w is known). N(x) = |T x|_2, or "
+    "max |(T x)_i| where the norm says so; all numbers are SI and exact as printed."
 )
 
 
@@ -98,7 +97,7 @@ def _prove(
     begins = [begin for begin, _ in system.pieces]
     of = [sum(begin <= piece.begin for begin in begins) - 1 for piece in pieces]
     loose = looseness(rows, found)
-    by_pieces = Loose(loose.peak[of], loose.mean[of], loose.step)
+    by_pieces = replace(loose, peak=loose.peak[of], mean=loose.mean[of])
     return prove_open(system, proved_metric(system, S), pieces, x0.tolist(), by_pieces)
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from flint import arb, arb_mat, arb_series, fmpq
 
 from .balls import ExactSystem, NotProvedError, coefficients, column, cosine, decimal, jacobian, precision, sine
-from .tube import Piece
+from .pieces import Piece
 
 DEGREE = 30
 LAST_TERM = 1e-13  # of a polynomial, over the size of the motion: it sets the length of a piece

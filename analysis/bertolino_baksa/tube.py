@@ -19,7 +19,7 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
-from flint import arb, arb_mat, arb_poly, arb_series, fmpq
+from flint import arb, arb_mat, arb_series
 
 from .balls import (
     Array,
@@ -31,33 +31,22 @@ from .balls import (
     column,
     cosine,
     jacobian,
+    magnitudes,
+    matrix,
     precision,
     sine,
 )
 from .norms import Metric
+from .pieces import Piece, derivative, everywhere, span
 
 Excess = Callable[[Balls, Balls], arb_mat]
 Outputs = Callable[[Sequence[Any], Sequence[Any], Any, Any], Sequence[Any]]
 MIDDLE, WHOLE = arb(0.5), arb(0.5, 0.5)  # of a piece, as τ
-MORE = 4  # terms of a defect's series beyond the polynomials' degree; what is left is enclosed
+OF_OUTPUTS = 20  # terms of outputs: the remainder is about 1e-10 of them
 TRIES = 60  # of a wider tube, before a piece is given up
 
 
-@dataclass(frozen=True, slots=True)
-class Piece:
-    """Coefficients (n, degree + 1) of τᵏ near x_lin and near e, τ = (t − begin)/(end − begin); times exact [s]."""
-
-    begin: fmpq
-    end: fmpq
-    linear: Array
-    error: Array
-
-    @property
-    def duration(self) -> fmpq:
-        """end − begin [s]."""
-        return self.end - self.begin
-
-
+Around = tuple[arb_mat, arb_mat]
 Off = tuple[float, float, float]
 """Bounds [‖·‖_S] for x_lin, x and e."""
 
@@ -87,7 +76,10 @@ def prove_tube(
     Raises NotProvedError where the pieces leave a gap or lie across a corner of w, or the tube cannot be closed.
     """
     B = input_matrix(system)
-    defects = [(_linear_defect(system, metric, B, p), defect_of(system, metric, p, both(p))) for p in pieces]
+    defects = []
+    for piece in pieces:
+        w = inputs_around(system, piece, piece.terms)
+        defects.append((_linear_defect(metric, B, piece, w), defect_of(system, metric, piece, piece.near_x, w)))
     return followed(system, metric, pieces, np.array(defects), start, (*off, off[0] + off[1]))
 
 
@@ -123,7 +115,9 @@ def prove_linear(system: ExactSystem, metric: Metric, pieces: Sequence[Piece]) -
     refuse_gaps(pieces)
     for piece in pieces:
         V = up(V + jumps(metric, before, piece)[0])
-        after = grown(V, -metric.alpha, _linear_defect(system, metric, B, piece), piece)
+        after = grown(
+            V, -metric.alpha, _linear_defect(metric, B, piece, inputs_around(system, piece, piece.terms)), piece
+        )
         found.append(max(V, after))
         V, before = after, (piece.linear, piece.error)
     return np.array(found)
@@ -141,15 +135,9 @@ def input_matrix(system: ExactSystem) -> arb_mat:
     return jacobian(system, [arb(0)] * system.n, [arb(0)] * system.m, inputs=True)
 
 
-def both(piece: Piece) -> list[list[Any]]:
-    """Exact coefficients of the polynomial near x: the sums of those near x_lin and near e."""
-    rows = zip(piece.linear.tolist(), piece.error.tolist(), strict=True)
-    return [[arb(a) + arb(b) for a, b in zip(lin, rest, strict=True)] for lin, rest in rows]
-
-
 def at_end(polynomials: Array) -> arb_mat:
-    """Exact values (n, 1) at τ = 1."""
-    return column([sum(row, arb(0)) for row in exact(polynomials)])
+    """Values (n, 1) at τ = 1, balls."""
+    return matrix(polynomials) * matrix(np.ones((polynomials.shape[1], 1)))
 
 
 def jumps(metric: Metric, before: tuple[Array, Array], piece: Piece) -> Off:
@@ -174,72 +162,54 @@ def up(x: float) -> float:
     return math.nextafter(x, math.inf)
 
 
-def exact(polynomials: Array) -> list[list[Any]]:
-    """Coefficients as balls."""
-    return [[arb(v) for v in row] for row in polynomials.tolist()]
-
-
-def _centred(p: Sequence[Balls], centre: Any, terms: int) -> list[list[Any]]:
-    """So many coefficients of polynomials in τ by powers of σ = 2 (τ − centre)."""
-    moved = arb_poly([centre, arb(1) / 2])
-    rows = [arb_poly(c)(moved).coeffs() for c in p]
-    return [[*row, *[arb(0)] * (terms - len(row))] for row in rows]
-
-
-def _inputs(system: ExactSystem, piece: Piece, centre: Any, terms: int) -> list[list[Any]]:
-    """So many coefficients of w by powers of σ = 2 (τ − centre), the centre a ball in 0 ≤ τ ≤ 1."""
+def inputs_around(system: ExactSystem, piece: Piece, terms: int) -> Around:
+    """Coefficients (m, terms) of σᵏ of w, around the middle of the piece, and around all of its points at once."""
     h = arb(piece.duration)
-    w = system.inputs_over(piece.begin, piece.end)(arb_series([arb(piece.begin) + h * centre, h / 2], prec=terms))
-    return [coefficients(wi, terms) for wi in w]
-
-
-def _linear_defect(system: ExactSystem, metric: Metric, B: arb_mat, piece: Piece) -> float:
-    """sup ‖A p + B w − p'‖_S [1/s]; beyond the polynomial's degree there is only w, whose last term is a remainder."""
-    terms = piece.linear.shape[1] + MORE
+    w = system.inputs_over(piece.begin, piece.end)
+    found = []
     with precision(terms):
-        w = _inputs(system, piece, MIDDLE, terms)
-        last = [at[-1] for at in _inputs(system, piece, WHOLE, terms)]
-        p = _centred(exact(piece.linear), MIDDLE, terms)
-    for wi, remainder in zip(w, last, strict=True):
-        wi[-1] = remainder
-    slope = [[*(row[k] * k for k in range(1, terms)), arb(0)] for row in p]
-    defect = metric.A * arb_mat(p) + B * arb_mat(w) - arb_mat(slope) * (2 / arb(piece.duration))
-    return _sup_length(metric, defect.entries(), terms)
-
-
-def defect_of(system: ExactSystem, metric: Metric, piece: Piece, p: Sequence[Balls]) -> float:
-    """sup ‖F(p, w) − p'‖_S [1/s] of polynomials p in τ on the piece."""
-    h = arb(piece.duration)
-
-    def defect(y: Sequence[Any], w: Sequence[Any], sin: Any, cos: Any) -> list[Any]:
-        return [rate - yi.derivative() * 2 / h for rate, yi in zip(system.equations(y, w, sin, cos), y, strict=True)]
-
-    rows = _series(system, piece, defect, p)
-    return _sup_length(metric, [c for row in rows for c in row], len(rows[0]))
-
-
-def _series(system: ExactSystem, piece: Piece, functions: Outputs, p: Sequence[Balls]) -> list[list[Any]]:
-    """Coefficients of σᵏ, σ = 2τ − 1, of functions(p, w, sin, cos): the last over the whole piece, others at σ = 0.
-
-    Around the middle, as there a remainder of order k weighs 2⁻ᵏ of what it does from an end on.
-    """
-    terms = piece.linear.shape[1] + MORE
-    found: list[list[list[Any]]] = []
-    with precision(terms + 1):
         for centre in (MIDDLE, WHOLE):
-            y = [arb_series(c, prec=terms + 1) for c in _centred(p, centre, terms + 1)]
-            w = [arb_series(c, prec=terms + 1) for c in _inputs(system, piece, centre, terms + 1)]
-            found.append([coefficients(value, terms) for value in functions(y, w, sine, cosine)])
-    return [[*at[:-1], over[-1]] for at, over in zip(*found, strict=True)]
+            around = w(arb_series([arb(piece.begin) + h * centre, h / 2], prec=terms))
+            found.append(arb_mat([coefficients(wi, terms) for wi in around]))
+    return found[0], found[1]
+
+
+def _linear_defect(metric: Metric, B: arb_mat, piece: Piece, w: Around) -> float:
+    """sup ‖A p + B w − p'‖_S [1/s]; beyond the polynomial's degree there is only w, whose last term is a remainder."""
+    p, (at, over) = piece.near_x_lin, w
+    bounded = arb_mat([[*row[:-1], whole[-1]] for row, whole in zip(at.tolist(), over.tolist(), strict=True)])
+    return _sup_length(metric, metric.A * p + B * bounded - _slope(piece, p))
+
+
+def defect_of(system: ExactSystem, metric: Metric, piece: Piece, p: arb_mat, w: Around) -> float:
+    """sup ‖F(p, w) − p'‖_S [1/s] of polynomials p and inputs w, as of `Piece.near_x` and `inputs_around`."""
+    return _sup_length(metric, _series(system.equations, p, w) - _slope(piece, p))
+
+
+def _slope(piece: Piece, p: arb_mat) -> arb_mat:
+    """p' by powers of σ [1/s]."""
+    return p * derivative(piece.terms) * (2 / arb(piece.duration))
+
+
+def _series(functions: Outputs, p: arb_mat, w: Around) -> arb_mat:
+    """Coefficients (k, terms) of σᵏ of functions(p, w, sin, cos): the last over the whole piece, others at σ = 0.
+
+    As many as w has. Around the middle, as there a remainder of order k weighs 2⁻ᵏ of what it does from an end on.
+    """
+    terms, found = w[0].ncols(), []
+    with precision(terms):
+        for both in zip((p, p * everywhere(p.ncols())), w, strict=True):
+            y, u = ([arb_series(row, prec=terms) for row in m.tolist()] for m in both)
+            found.append([coefficients(value, terms) for value in functions(y, u, sine, cosine)])
+    return arb_mat([[*at[:-1], over[-1]] for at, over in zip(*found, strict=True)])
 
 
 def enclosed_series(system: ExactSystem, piece: Piece, functions: Outputs, off: Array) -> tuple[Array, Array]:
-    """Outputs along all x with |x_j − p_j| ≤ off_j: coefficients (k, terms) of (2τ − 1)ᵏ, and how far (k,) they may be
-    off."""
-    p = both(piece)
-    for row, radius in zip(p, off.tolist(), strict=True):
-        row[0] = row[0] + arb(0, radius)
-    rows = _series(system, piece, functions, p)
+    """Outputs along all x and w that are off the piece's by off_j (n + m,) at most: coefficients (k, terms) of
+    (2τ − 1)ᵏ, and how far (k,) they may be off."""
+    n = system.n
+    w = [_widened(m, off[n:]) for m in inputs_around(system, piece, OF_OUTPUTS)]
+    rows = _series(functions, _widened(piece.near_x, off[:n]), (w[0], w[1])).tolist()
     centres = [[float(c.mid()) for c in row[:-1]] for row in rows]
     rest = [
         sum(above(c - arb(near)) for c, near in zip(row, nears, strict=False)) + above(row[-1])
@@ -248,10 +218,15 @@ def enclosed_series(system: ExactSystem, piece: Piece, functions: Outputs, off: 
     return np.array(centres), np.array(rest) * (1.0 + 1e-13)
 
 
-def _sup_length(metric: Metric, entries: Sequence[Any], terms: int) -> float:
-    """Bound of ‖Σ d_k σᵏ‖_S over |σ| ≤ 1 from the entries, row by row."""
-    rows = [entries[k : k + terms] for k in range(0, len(entries), terms)]
-    return metric.longest(np.array([above(sum(map(abs, row), arb(0))) for row in rows]))
+def _widened(m: arb_mat, off: Array) -> arb_mat:
+    """Coefficients with balls of these radii around the first of each row."""
+    rows = m.tolist()
+    return arb_mat([[row[0] + arb(0, radius), *row[1:]] for row, radius in zip(rows, off.tolist(), strict=True)])
+
+
+def _sup_length(metric: Metric, d: arb_mat) -> float:
+    """Bound of ‖Σ d_k σᵏ‖_S over |σ| ≤ 1, row by row."""
+    return metric.longest(magnitudes(d * span(d.ncols())).ravel())
 
 
 def over(system: ExactSystem, piece: Piece) -> list[Any]:
@@ -266,7 +241,7 @@ def closed(
 
     excess : ∂F/∂x − A over the balls x and w.  rate : A's logarithmic norm.
     """
-    ranges = [arb_poly(c)(arb(0, 1)) for c in _centred(both(piece), MIDDLE, 0)]
+    ranges = (piece.near_x * span(piece.terms)).entries()
     w = over(system, piece)
     most = 2.0 * (V + defect * above(arb(piece.duration)))
     for _ in range(TRIES):

@@ -10,12 +10,14 @@ from typing import Any
 import numpy as np
 
 from fmu_src.quantities import STATES
+from fmu_src.vehicle.vehicle7dof import CAR
 
-from ..bertolino_baksa.balls import NotProvedError, precision
+from ..bertolino_baksa.balls import Array, NotProvedError, precision
 from ..bertolino_baksa.bounded_certificate import BoundedCertificate, certify, smallest, to_json
-from ..bertolino_baksa.bounded_inputs import Bounds, Driven, Gains, gains, reached, worst_inputs
+from ..bertolino_baksa.bounded_inputs import Bounds, Driven, Gains, gains
 from ..bertolino_baksa.norms import proved_metric
 from ..bertolino_baksa.search import CLOSE, largest
+from ..bertolino_baksa.worst_inputs import reached, worst_inputs
 from ..car import car_form
 from ..errors import InputError
 from ..files import write_whole
@@ -26,9 +28,9 @@ from .directed import at_least, at_most
 from .exact_car import norms
 
 
-def flat(parameters: Mapping[str, Any]) -> dict[str, Any]:
-    """The model of the car alone."""
-    return model_of({**parameters, "profile": "flat"})
+def flat(parameters: Mapping[str, Any], gain: Array | None = None) -> dict[str, Any]:
+    """The model of the car alone, or with a gain (4, 14)."""
+    return model_of({**{name: value for name, value in parameters.items() if name in CAR}, "profile": "flat"}, gain)
 
 
 def car_gains(parameters: Mapping[str, Any]) -> Gains:

@@ -68,14 +68,7 @@ def build(model: dict[str, Any]) -> ExactSystem:
 def _checked(model: dict[str, Any]) -> tuple[Parameters, Array | None]:
     if unknown := set(model) - {"kind", "parameters", "gain"}:
         raise InputError(f"model: wanted kind, parameters and perhaps a gain, got {', '.join(sorted(unknown))}")
-    parameters = model.get("parameters")
-    if not isinstance(parameters, dict):
-        raise InputError(f"model: wanted parameters by name, got {parameters!r}")
-    for name, value in parameters.items():
-        if name not in KINDS:
-            raise InputError(f"model: {name}: no parameter of car or road; known are {', '.join(KINDS)}")
-        if not isinstance(value, KINDS[name]) or isinstance(value, bool) is not (KINDS[name] is bool):
-            raise InputError(f"model: {name} = {value!r}: wanted a {WORDS[KINDS[name]]}")
+    parameters = checked_parameters(model.get("parameters"), KINDS, "car or road")
     if "gain" not in model:
         return parameters, None
     try:
@@ -85,6 +78,18 @@ def _checked(model: dict[str, Any]) -> tuple[Parameters, Array | None]:
     if gain.shape != (4, 14):
         raise InputError(f"model: wanted a gain of 4 x 14 numbers, got the shape {gain.shape}")
     return parameters, gain
+
+
+def checked_parameters(parameters: Any, kinds: Mapping[str, type], of: str) -> Parameters:
+    """The parameters themselves. Raises InputError unless each has a known name and is of its kind."""
+    if not isinstance(parameters, dict):
+        raise InputError(f"model: wanted parameters by name, got {parameters!r}")
+    for name, value in parameters.items():
+        if name not in kinds:
+            raise InputError(f"model: {name}: no parameter of {of}; known are {', '.join(kinds)}")
+        if not isinstance(value, kinds[name]) or isinstance(value, bool) is not (kinds[name] is bool):
+            raise InputError(f"model: {name} = {value!r}: wanted a {WORDS[kinds[name]]}")
+    return parameters
 
 
 def certify_car(parameters: Mapping[str, Any], gain: Array | None = None) -> tuple[Certificate, Proof]:

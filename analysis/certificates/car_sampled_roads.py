@@ -10,7 +10,6 @@ import numpy as np
 from fmu_src.quantities import STATES
 
 from ..bertolino_baksa.balls import Array, NotProvedError
-from ..bertolino_baksa.cells import errors_of_states
 from ..bertolino_baksa.certificate import motion
 from ..bertolino_baksa.input_rows import InputRows
 from ..bertolino_baksa.norms import Norm
@@ -20,44 +19,53 @@ from ..bertolino_baksa.rows_certificate import RowsCertificate, certify, to_json
 from ..car import car_form
 from ..files import write_whole
 from ..reference import Parameters, car_of
+from .adversary_points import row_points
 from .car_bounded_roads import flat
 from .car_certificates import build, metric_of
+from .certificate_figures import draw_delta
 from .certificate_words import model_words, named_by_content, refuse_exceeded, start_words
+from .closed_loop_certificate import infinite_gain
 from .directed import at_least, at_most
 from .exact_car import norms
 from .exported import read_heights
+from .motion_words import along
 from .unknown_roads import road_class
 
 
-def command(parameters: Parameters, road: Path, roads: str, where: Path | None) -> int:
+def command(parameters: Parameters, road: Path, roads: str, where: Path | None, closed: bool) -> int:
     """Certify x_lin from rest on every road of the class through the file's heights; 0, or 1 if nothing is proved.
+
+    closed : whether the controller's constant gain acts at every instant.
 
     Raises InputError for a file that holds no road, and for an unknown class.
     """
     rows = InputRows(*read_heights(road), road_class(roads))
+    gain = infinite_gain(parameters) if closed else None
     print(f"Finding and proving a motion to t = {rows.times[-1]:g} s ...", file=sys.stderr, flush=True)
     try:
-        certificate, proof = certify_rows(parameters, rows)
+        certificate, proof = certify_rows(parameters, rows, gain)
         lines = statement(certificate, proof)
     except NotProvedError as error:
         print(f"no certificate of all these roads: {error}")
         return 1
-    for line in lines:
+    points = row_points(certificate)
+    for line in (*lines, *(each.words for each in points)):
         print(line)
     if where is not None:
         write_whole(where, to_json(certificate))
-        print(f"{where}: written")
+        write_whole(where.with_suffix(".svg"), draw_delta(points))
+        print(f"{where}, {where.with_suffix('.svg')}: written")
     return 0
 
 
-def certify_rows(parameters: Parameters, rows: InputRows) -> tuple[RowsCertificate, Proof]:
+def certify_rows(parameters: Parameters, rows: InputRows, gain: Array | None = None) -> tuple[RowsCertificate, Proof]:
     """The certificate of x_lin from rest for this car. Raises NotProvedError, with the reason, if there is none."""
     car = car_of(parameters)
 
     def named(x_lin: Array) -> tuple[Norm, ...]:
         return norms(car, x_lin)
 
-    return certify(flat(parameters), build, metric_of(car), named, rows, np.zeros(14))
+    return certify(flat(parameters, gain), build, metric_of(car, gain), named, rows, np.zeros(14))
 
 
 def statement(certificate: RowsCertificate, proof: Proof) -> list[str]:
@@ -71,8 +79,9 @@ def statement(certificate: RowsCertificate, proof: Proof) -> list[str]:
     claims = named_by_content(certificate.claims, norms(car, motion(certificate.pieces)))
     most = reached(form, [claim.norm for claim in claims], rows, certificate.x0)
     start, last = start_words(certificate.x0), float(rows.times[-1])
+    assert proof.open is not None
     lines = [
-        f"x_lin {start} is almost stable (definition 2.1) until t = {last:g} s on every road of class {rows.between} "
+        f"x_lin {start} is almost stable (definition 2.1) until t = {last!r} s on every road of class {rows.between} "
         f"through {len(rows.times)} rows of heights: for every eps >= l,"
     ]
     for claim, far in zip(claims, most.tolist(), strict=True):
@@ -83,19 +92,19 @@ def statement(certificate: RowsCertificate, proof: Proof) -> list[str]:
             f"  {claim.norm.name} norm: l <= {at_most(claim.floor, 6)} (roads of the class reach {far:.6g}{ratio}); "
             f"delta up to {at_least(delta)}, at eps = {at_most(epsilon)}"
         )
-    return [*lines, *model_words(model, road=False), *_along(proof, start)]
-
-
-def _along(proof: Proof, start: str) -> list[str]:
-    """Of the motions from x0 alone: |x − x_lin|, and how far x_lin itself is left open by the road."""
-    assert proof.open is not None
-    e = errors_of_states(proof.tube, proof.metric) + proof.open.rows(np.eye(14)).max(axis=0)
-    words = (
-        ", ".join(f"{q.name} {at_most(v, 3)} {q.unit}" for q, v in zip(STATES[:7], values.tolist(), strict=False))
-        for values in (e, proof.open.linear.max(axis=0))
+    words = ", ".join(
+        f"{q.name} {at_most(v, 3)} {q.unit}"
+        for q, v in zip(STATES[:7], proof.open.linear.max(axis=0).tolist(), strict=False)
     )
     return [
-        f"  of the motion {start} itself, on every such road:",
-        f"    |x - x_lin| at most {next(words)}",
-        f"    x_lin is off that of the file's polynomials by at most {next(words)}",
+        *lines,
+        *model_words(model, road=False),
+        *along(
+            model["parameters"],
+            proof.system,
+            [(proof.tube, proof.metric)],
+            f"{start} itself, on every such road, until t = {last!r} s",
+            proof.open,
+        ),
+        f"    x_lin is off that of the file's polynomials by at most {words}",
     ]

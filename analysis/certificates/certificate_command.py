@@ -3,47 +3,47 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from fmu_src.quantities import CORNER_WORDS, PARAMETERS, STATES
+from fmu_src.quantities import PARAMETERS
 
-from ..bertolino_baksa import bounded_certificate, rows_certificate
+from ..bertolino_baksa import bounded_certificate, rows_certificate, switched_certificate
 from ..bertolino_baksa.adversary import long_enough, reference_floor
-from ..bertolino_baksa.balls import NotProvedError, precision
+from ..bertolino_baksa.balls import NotProvedError
 from ..bertolino_baksa.bounded_certificate import BoundedCertificate
-from ..bertolino_baksa.cells import errors_of_states, outputs
 from ..bertolino_baksa.certificate import Certificate, certificate_of, opened, to_json, verify
 from ..bertolino_baksa.proof import Proof
 from ..bertolino_baksa.rows_certificate import RowsCertificate
 from ..bertolino_baksa.search import largest
-from ..bertolino_baksa.tube import Tube
+from ..bertolino_baksa.switched_certificate import SwitchedCertificate
 from ..car import car_form, road_signal
-from ..energy import tyre_heights
 from ..errors import InputError
 from ..files import write_whole
-from ..methods.polynomials import Array
 from ..reference import Parameters, car_of, road_parameters
+from ..scenario import Scenario
 from ..trajectory import CERTIFICATE
-from ..tyres import static_loads_of
-from .car_bounded_roads import statement as every_road
+from .adversary_points import adversary_points
 from .car_certificates import build, car_norms, certify_car, prove_reference
-from .car_sampled_roads import statement as sampled_roads
-from .certificate_words import model_words, named_by_content, refuse_exceeded, start_words
-from .directed import at_least, at_most
-from .exact_car import exact_car
+from .certificate_words import model_words, named_by_content, start_words
+from .directed import at_least
+from .motion_words import along, claim_words
 
+AnyCertificate = Certificate | BoundedCertificate | RowsCertificate | SwitchedCertificate
 CLOSE = 1.02  # ratio at which the bisection for the largest amplitude stops
 
 
-def make_certificate(parameters: Parameters, where: Path | None, *, search: bool = False) -> int:
+def make_certificate(scenario: Scenario, where: Path | None, *, search: bool = False, starts: int = 0) -> int:
     """Certify x_lin from rest, print what is proved, write the file; 0, or 1 if there is no certificate.
 
     It is of the car without control: a controller of these parameters is left out, and that is said.
+
+    search : whether the largest amplitude is sought.  starts : number of starts that are tried on the FMUs; 1 is
+             returned if one of them gets beyond ε.
     """
+    parameters = scenario.parameters
     if parameters.get("enabled", True):
         print("The car is certified without its controller; with it: --closed-loop.", file=sys.stderr)
     print("Finding and proving a reference motion ...", file=sys.stderr, flush=True)
@@ -54,19 +54,28 @@ def make_certificate(parameters: Parameters, where: Path | None, *, search: bool
         print(f"no certificate: {error}")
         return 1
     for line in lines:
-        print(line)
+        print(line, flush=True)
+    points = adversary_points(certificate)
+    for line in (each.words for each in points):
+        print(line, flush=True)
     if search:
         A = at_least(largest_amplitude(parameters))
         print(f"  the largest A with a proved tube: {A} m (by bisection, to {CLOSE:g})")
     if where is not None:
         write_whole(where, to_json(certificate))
         print(f"{where}: written")
-        from .certificate_figures import adversary_points, draw_delta
+        from .certificate_figures import draw_delta
 
         picture = where.with_suffix(".svg")
-        write_whole(picture, draw_delta(adversary_points(certificate)))
+        write_whole(picture, draw_delta(points))
         print(f"{picture}: written")
-    return 0
+    if not starts:
+        return 0
+    from .fmu_starts import on_the_fmus
+
+    found, within = on_the_fmus(certificate, scenario, starts)
+    print("\n".join(found))
+    return 0 if within else 1
 
 
 def judge_certificate(path: Path) -> int:
@@ -90,21 +99,32 @@ def judge_certificate(path: Path) -> int:
     return 0
 
 
-def _any_kind(content: dict[str, Any]) -> Certificate | BoundedCertificate | RowsCertificate:
+def _any_kind(content: dict[str, Any]) -> AnyCertificate:
     match content.get("kind"):
         case bounded_certificate.KIND:
             return bounded_certificate.certificate_of(content)
         case rows_certificate.KIND:
             return rows_certificate.certificate_of(content)
+        case switched_certificate.KIND:
+            return switched_certificate.certificate_of(content)
         case _:
             return certificate_of(content)
 
 
-def _proved_anew(certificate: Certificate | BoundedCertificate | RowsCertificate) -> list[str]:
+def _proved_anew(certificate: AnyCertificate) -> list[str]:
     if isinstance(certificate, BoundedCertificate):
+        from .car_bounded_roads import statement as every_road
+
         return every_road(certificate, bounded_certificate.verify(certificate, build))
     if isinstance(certificate, RowsCertificate):
+        from .car_sampled_roads import statement as sampled_roads
+
         return sampled_roads(certificate, rows_certificate.verify(certificate, build))
+    if isinstance(certificate, SwitchedCertificate):
+        from .finite_horizon import build as build_by_time
+        from .horizon_words import statement as by_time
+
+        return by_time(certificate, switched_certificate.verify(certificate, build_by_time))
     return statement(certificate, verify(certificate, build))
 
 
@@ -120,57 +140,15 @@ def statement(certificate: Certificate, proof: Proof) -> list[str]:
     stop = min(float(certificate.pieces[-1].end), long_enough(form, signal))
     true = reference_floor(form, signal, [c.norm for c in claims], certificate.x0, stop)
     start = start_words(certificate.x0)
-    lines = [f"x_lin {start} is almost stable (definition 2.1): for all t >= 0 and every eps >= l,"]
-    for claim, floor in zip(claims, true.tolist(), strict=True):
-        epsilon, delta = claim.table[-1].tolist()
-        refuse_exceeded(claim, floor)
-        beside = f"a reference motion reaches {floor:.6g}" + (f": ratio {claim.floor / floor:.4f}" if floor else "")
-        lines.append(
-            f"  {claim.norm.name} norm: l <= {at_most(claim.floor, 6)} ({beside}); "
-            f"delta up to {at_least(delta)}, at eps = {at_most(epsilon)}"
-        )
-    ends = "x -> 0 after the road's end" if proof.repetition is None else "every period's tube returns into itself"
-    return [*lines, *model_words(model), f"  {ends}", *_along(model["parameters"], proof, start)]
-
-
-def _along(parameters: Parameters, proof: Proof, start: str) -> list[str]:
-    """Of the motion from x0 alone, for how long: |x − x_lin|, and whether the springs of its tyres only push.
-
-    With its later periods where the road repeats itself; the tail of a road that ends is left out.
-    """
-    tubes = [proof.tube, *([proof.repetition.window] if proof.repetition else [])]
-    until = "for all t >= 0" if proof.repetition else f"until t = {float(proof.tube.pieces[-1].end):g} s"
-    bounds = np.max([errors_of_states(tube, proof.metric) for tube in tubes], axis=0)
-    named = ", ".join(f"{q.name} {at_most(b, 3)} {q.unit}" for q, b in zip(STATES[:7], bounds.tolist(), strict=False))
-    low = np.min([_loads(parameters, proof, tube) for tube in tubes], axis=0)
-    worst = int(np.argmin(low))
-    load = f"each tyre's load is at least {at_least(low[worst])} N ({CORNER_WORDS[worst]})"
-    contact = (
-        "so that it stays on the ground; of other starts within delta this is not said"
-        if low[worst] > 0.0
-        else "so that contact is not proved: where a load is negative the certificate speaks of springs that pull"
-    )
+    again = proof.repetition
+    tubes = [(tube, proof.metric) for tube in (proof.tube, *([again.window] if again else []))]
+    until = "for all t >= 0" if again else f"until t = {float(proof.tube.pieces[-1].end):g} s"
     return [
-        f"  of the motion {start} itself, {until}:",
-        f"    |x - x_lin| at most {named}",
-        f"    {load}, {contact}",
+        *claim_words(claims, true, start),
+        *model_words(model),
+        "  every period's tube returns into itself" if again else "  x -> 0 after the road's end",
+        *along(model["parameters"], proof.system, tubes, f"{start} itself, {until}"),
     ]
-
-
-def _loads(parameters: Parameters, proof: Proof, tube: Tube) -> Array:
-    """Smallest loads (4,) [N] of the tyres in a tube."""
-    car = exact_car(car_of(parameters))
-    cp, bp = (car.cp1, car.cp1, car.cp2, car.cp2), (car.bp1, car.bp1, car.bp2, car.bp2)
-
-    def forces(x: Sequence[Any], w: Sequence[Any], sin: Any, cos: Any) -> list[Any]:
-        heights, rates = tyre_heights(car, x[:7], x[7:], sin, cos)
-        return [
-            c * (h - height) + b * (dh - rate)
-            for c, b, h, dh, height, rate in zip(cp, bp, w[:4], w[4:], heights, rates, strict=True)
-        ]
-
-    with precision(2):
-        return outputs(proof.system, tube, proof.metric, forces)[0] + static_loads_of(car_of(parameters))
 
 
 def largest_amplitude(parameters: Parameters) -> float:

@@ -10,66 +10,24 @@ import numpy as np
 
 from fmu_src.quantities import POSITIONS, STATES, Quantity
 
-from ..bertolino_baksa.adversary import long_enough, reached, reference_floor, slowest
 from ..bertolino_baksa.certificate import Certificate, Claim
 from ..bertolino_baksa.funnel import ends, funnel
 from ..bertolino_baksa.proof import Proof
-from ..car import car_form, road_signal
 from ..figures import BLUE, DASHED, ORANGE, READING, RED, Axes, Subject, axis_label, finish, readable, render, words
 from ..methods.polynomials import Array
-from ..reference import car_of, road_parameters
 from ..run_figures import DELTA, TUBE
 from ..trajectory import Run
+from .adversary_points import Points
 from .car_certificates import linear_motion
 from .directed import at_least, at_most
 
 UNITS = {"energy": "√J", "weighted sup": "–", "Euclid": "SI"}
-POINTS = 5  # of an adversary, spread over the table of δ(ε)
 SHOWN = 0.1  # of the largest N(x_lin): a start as far off is shown with its tube
 LOWEST = 1e-3  # of the floor: what the logarithmic axis of N(x − x_lin) begins with
 PALE = "#dfe9f2"
 
 
 # ---------------------------------------------------------------------------------------------------- δ(ε)
-@dataclass(frozen=True, slots=True)
-class Points:
-    """Rows of a table of δ(ε), and the largest N(x − x_lin) that was found for starts within each δ."""
-
-    claim: Claim
-    rows: Array  # (K, 2) of (ε, δ)
-    found: Array  # (K,)
-    floor: float  # of the motion from x_lin(0) itself
-
-    @property
-    def ratio(self) -> Array:
-        """Certified over found ε (K,)."""
-        return np.asarray(self.rows[:, 0] / self.found)
-
-
-def adversary_points(certificate: Certificate) -> list[Points]:
-    """An adversary's answer to each claim; some seconds."""
-    parameters, gain = certificate.model["parameters"], certificate.model.get("gain")
-    form = car_form(car_of(parameters), gain=None if gain is None else np.array(gain))
-    signal, end = road_signal(road_parameters(parameters)), float(certificate.pieces[-1].end)
-    norms = [claim.norm for claim in certificate.claims]
-    floors = reference_floor(form, signal, norms, certificate.x0, min(end, long_enough(form, signal)))
-    chosen = [_spread(claim) for claim in certificate.claims]
-    found = reached(
-        form, signal, norms, certificate.x0, [rows[:, 1] for rows in chosen], min(end, signal.edges[-1] + slowest(form))
-    )
-    return [
-        Points(claim, rows, np.maximum(far, floor), floor)
-        for claim, rows, far, floor in zip(certificate.claims, chosen, found, floors.tolist(), strict=True)
-    ]
-
-
-def _spread(claim: Claim) -> Array:
-    """Rows of the table, spread over it, with that of the largest δ up to a third of δ_max among them."""
-    third = int(np.searchsorted(claim.table[:, 1], claim.largest_delta / 3.0, side="right")) - 1
-    spread = np.linspace(0, len(claim.table) - 1, POINTS).round().astype(int)
-    return claim.table[np.unique([*spread, max(third, 0)])]
-
-
 def draw_delta(points: Sequence[Points]) -> bytes:
     """The curves δ(ε) as SVG, with their caption in it."""
     subject = Subject(
@@ -87,12 +45,11 @@ def draw_delta(points: Sequence[Points]) -> bytes:
 def _delta_caption(points: Sequence[Points]) -> str:
     said = []
     for each in points:
-        near = each.ratio[each.rows[:, 1] <= each.claim.largest_delta / 3.0].max(initial=1.0)
         floor = f" = {readable(each.claim.floor / each.floor, 5)} times what is reached" if each.floor > 0.0 else ""
         said.append(
             f"{each.claim.norm.name}: l = {_typeset(at_most(each.claim.floor))}{floor}, "
             f"δ_max = {_typeset(at_least(each.claim.largest_delta))}, "
-            f"certified over found ε up to {readable(near, 3)} for "
+            f"certified over found ε up to {readable(each.near, 3)} for "
             f"δ ≤ δ_max/3 and {readable(each.ratio[-1], 3)} at δ_max"
         )
     return (

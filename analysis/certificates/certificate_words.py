@@ -11,6 +11,7 @@ import numpy as np
 from fmu_src.quantities import CORNERS, PARAMETERS, STATES
 from fmu_src.road.profiles import PROFILE
 from fmu_src.road.road_excitation import RoadExcitation
+from fmu_src.vehicle.vehicle7dof import CAR
 
 from ..bertolino_baksa.balls import NotProvedError
 from ..bertolino_baksa.certificate import Claim
@@ -57,8 +58,8 @@ def model_words(model: Mapping[str, Any], *, road: bool = True) -> list[str]:
         said["A"] = given.get("A", DEFAULTS["A"])
     said |= {name: value for name, value in given.items() if value != DEFAULTS[name]}
     if not road:
-        said.pop(PROFILE.name)
-    off = ", ".join(f"{name} = {_number(value)}{_unit(name)}" for name, value in said.items())
+        said = {name: value for name, value in said.items() if name in CAR}
+    off = ", ".join(f"{name} = {number(value)}{_unit(name)}" for name, value in said.items())
     lines = [f"  {'car and road' if road else 'car'}: {f'{off}; the rest is the default' if off else 'the default'}"]
     if "gain" not in model:
         return [*lines, "  without control"]
@@ -70,18 +71,19 @@ def model_words(model: Mapping[str, Any], *, road: bool = True) -> list[str]:
 def _force(row: Sequence[float]) -> str:
     """−row · x, by the names of the states."""
     terms = " ".join(
-        f"{'-' if k > 0.0 else '+'} {_number(abs(k))} {q.name}" for k, q in zip(row, STATES, strict=True) if k
+        f"{'-' if k > 0.0 else '+'} {number(abs(k))} {q.name}" for k, q in zip(row, STATES, strict=True) if k
     )
     return terms or "0"
 
 
 def start_words(x0: Array) -> str:
     """x(0) = x0."""
-    off = [f"{q.name} = {_number(v)} {q.unit}" for q, v in zip(STATES, x0.tolist(), strict=True) if v]
+    off = [f"{q.name} = {number(v)} {q.unit}" for q, v in zip(STATES, x0.tolist(), strict=True) if v]
     return f"from {', '.join(off)}" if off else "from rest"
 
 
-def _number(value: float | str | bool) -> str:
+def number(value: float | str | bool) -> str:
+    """The value, short where that is exact."""
     return f"{value:g}" if isinstance(value, float) and float(f"{value:g}") == value else str(value)
 
 

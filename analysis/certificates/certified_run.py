@@ -21,9 +21,10 @@ from ..methods.polynomials import Array
 from ..reference import car_of, road_parameters
 from ..run_figures import DELTA, FOLDER, TUBE
 from ..trajectory import CERTIFICATE, Run
+from .adversary_points import adversary_points
 from .car_certificates import car_norms, certify_car, linear_motion
 from .certificate_command import statement
-from .certificate_figures import adversary_points, draw_delta, draw_tube, in_tube
+from .certificate_figures import draw_delta, draw_tube, in_tube
 from .certificate_words import named_by_content
 from .directed import at_least, at_most
 from .run_certificates import acting

@@ -58,7 +58,8 @@ def _shape(road: RoadParameters, half: fmpq) -> Callable[[Any], tuple[Any, Any]]
     def shape(s: Any) -> tuple[Any, Any]:
         height, rate = arb(0), arb(0)
         for A, omega in waves:
-            height, rate = height + (s * omega).sin() * A, rate + (s * omega).cos() * (A * omega)
+            sin, cos = (s * omega).sin_cos()
+            height, rate = height + sin * A, rate + cos * (A * omega)
         return height, rate
 
     return shape

@@ -86,10 +86,15 @@ def read_export(path: Path, scenario: Scenario) -> tuple[Run, dict[str, Array]]:
 def read_heights(path: Path) -> tuple[Array, Array]:
     """Times (N,) [s] and heights (N, 4) [m] under the wheels of a road's or a run's CSV.
 
-    Raises InputError naming row and column of what cannot be one, and unless it begins at t = 0.
+    Raises InputError naming row and column of what cannot be one, unless it begins at t = 0, and for a log of the car,
+    in which the road is what was passed on a step ago.
     """
-    rows, _, names = _table(path)
+    rows, header, names = _table(path)
     wanted = ["time", *(q.name for q in ROAD_HEIGHTS)]
+    if LOGGED in header and STATES[0].name in names:
+        raise InputError(
+            f"{path}: row 1: a log of the car, whose heights are of the step before; wanted the road's own"
+        )
     if missing := [name for name in wanted if name not in names]:
         raise InputError(f"{path}: row 1: wanted {', '.join(wanted)}, but {', '.join(missing)} are missing")
     cells = _picked(rows, [names.index(name) for name in wanted], path)

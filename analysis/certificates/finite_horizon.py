@@ -1,4 +1,7 @@
-"""The car under the controller's own gain table on its finite horizon, with nothing rounded; after T it is passive."""
+"""The car under the controller's own gain table on its finite horizon, with nothing rounded; after T it is passive.
+
+The table is a part of the model: what is proved is proved of its polynomials, however they were found.
+"""
 
 from __future__ import annotations
 
@@ -10,53 +13,133 @@ import numpy as np
 from flint import arb, arb_mat, fmpq
 
 from fmu_src.controller.design import design
-from fmu_src.controller.gain_table import GainTable
-from fmu_src.controller.law import control_parameters
+from fmu_src.controller.gain_table import DEGREE, GainTable
+from fmu_src.controller.hardware import Hardware
+from fmu_src.controller.law import (
+    ACTIVATION,
+    DESIGN,
+    HALF_CAR,
+    HORIZON,
+    REALS,
+    WEIGHTS,
+    ControlParameters,
+    control_parameters,
+)
+from fmu_src.quantities import ParameterError
 
+from ..bertolino_baksa import strict
 from ..bertolino_baksa.balls import Balls, ExactSystem, NotProvedError, column, decimal, jacobian, precision
-from ..bertolino_baksa.norms import Norm
-from ..bertolino_baksa.search import largest
-from ..bertolino_baksa.switched import Measured, measured, phases
+from ..bertolino_baksa.norms import Norm, contracting
+from ..bertolino_baksa.switched import Phase, Switched, SwitchedProof, switched
+from ..bertolino_baksa.switched_certificate import SwitchedCertificate, certify
 from ..bertolino_baksa.taylor import find_pieces
 from ..bertolino_baksa.tube import Excess
 from ..car import car_equations
+from ..errors import InputError
 from ..methods.polynomials import Array
 from ..reference import Parameters, car_of, road_parameters
 from ..stabilization.full_car import strut_gain
-from .car_certificates import metric_of
+from .car_certificates import KINDS, OTHERS, checked_parameters, metric_of
 from .exact_car import exact_car, exact_system
 
+KIND = "car under a gain by time"
 AFTER = 7.0  # times 1/α of the passive car that the pieces go on after T
+CONTROL: dict[str, type] = {
+    **{name: float for name in (*REALS, *HALF_CAR, *WEIGHTS) if name not in KINDS},
+    **dict.fromkeys((HORIZON.name, ACTIVATION.name, DESIGN.name), str),
+}  # parameters of the controller that have a part in its gains and times
+ENTRIES = {"half-car": 8, "full-car": 56}  # of K, by the design
 
 
-def finite_horizon(parameters: Parameters) -> tuple[Measured, Measured]:
-    """The motion from rest without control, and with the law on its horizon [t_on, T), ready for ε of δ.
+def certify_horizon(parameters: Parameters, norms: Sequence[Norm]) -> tuple[SwitchedCertificate, SwitchedProof]:
+    """The certificate of x_lin from rest with the controller of these parameters on its horizon [begin, T).
 
-    Raises NotProvedError where no tube is found, or where control would begin before the road's end.
+    Raises NotProvedError where there is none; InputError for hardware and for a controller without a horizon's end.
     """
-    control = control_parameters(parameters)
-    table = design(control.model, infinite=True, span=control.end - control.begin)
-    assert table.finite is not None and table.infinite is not None
-    begin, end = decimal(control.begin), decimal(control.end)
-    car = car_of(parameters)
-    gain = -as_gain(np.array(table.infinite))
-    S, closed = metric_of(car), metric_of(car, gain)
+    refuse_hardware(parameters)
+    control = control_parameters({**parameters, "enabled": True})
+    _refuse_endless(control)
+    made = design(control.model, infinite=True, span=control.end - control.begin)
+    assert made.finite is not None and made.infinite is not None
+    return certify_table(parameters, made.finite, -as_gain(np.array(made.infinite)), norms)
+
+
+def certify_table(
+    parameters: Parameters, table: GainTable, near: Array, norms: Sequence[Norm]
+) -> tuple[SwitchedCertificate, SwitchedProof]:
+    """The same with this table; near (4, 14): a constant gain of u = −gain x, in whose metric control is bounded."""
+    model, car = model_of(parameters, table), car_of(parameters)
+    passive, closed = metric_of(car), metric_of(car, near)
     with precision(2):
-        system, linear, excess = controlled(parameters, table.finite, begin, end)
-        passive = exact_system(car, road_parameters(parameters))
-        if passive.period != 0:
+        loop = build(model)
+        if loop.system.period != 0:
             raise NotProvedError("the finite horizon is proved on a road that ends flat only")
-        _, resting, left = controlled(parameters, None, begin, end)
-        found = []
-        for each, rates, more, begins, metrics in (
-            (passive, resting, left, [fmpq(0)], [S]),
-            (system, linear, excess, [fmpq(0), begin, end], [S, closed, S]),
-        ):
-            switched = phases(each, rates, more, begins, metrics)
-            stop = max(end, each.pieces[-1][0]) + decimal(round(AFTER / switched.phases[0].metric.alpha, 2))
-            pieces = find_pieces(each, [0.0] * 14, stop, changing=switched.linear_system)
-            found.append(measured(switched, pieces))
-    return found[0], found[1]
+        begin, end = times(control_parameters(model["parameters"]))
+        alpha = contracting(loop.A.rest, passive).alpha
+        stop = max(end, loop.system.pieces[-1][0]) + decimal(round(AFTER / alpha, 2))
+        pieces = find_pieces(loop.system, [0.0] * 14, stop, changing=loop.linear_system)
+    switches = sorted({t for t in (fmpq(0), begin, end) if t >= 0})
+    phases = [Phase(t, closed if begin <= t < end else passive) for t in switches]
+    return certify(model, loop, phases, pieces, norms)
+
+
+def refuse_hardware(parameters: Parameters) -> None:
+    """Raise InputError, which names it, where the struts do not do at once what the law asks for."""
+    hardware = control_parameters(parameters).hardware
+    if not hardware.ideal:
+        names = ("actuators", "feedback", "force_limit", "actuator_lag", "sample_time")
+        found = [name for name in names if getattr(hardware, name) != getattr(Hardware(), name)]
+        got = ", ".join(f"{name} = {getattr(hardware, name)!r}" for name in found)
+        raise InputError(f"--closed-loop: the proof is of the law itself; wanted no hardware, got {got}")
+
+
+def _refuse_endless(control: ControlParameters) -> None:
+    if control.horizon != "finite":
+        raise InputError(f"horizon = {control.horizon}: wanted a finite one, with a gain by time")
+
+
+def times(control: ControlParameters) -> tuple[fmpq, fmpq]:
+    """When control begins and ends [s], exactly."""
+    return decimal(control.begin), decimal(control.end)
+
+
+def model_of(parameters: Parameters, table: GainTable) -> dict[str, Any]:
+    """The model of a certificate: parameters of car, road and controller, and the gain table."""
+    kinds = {*KINDS, *CONTROL}
+    ours = {name: value for name, value in parameters.items() if name in kinds or name not in OTHERS}
+    rows = {"edges": list(table.edges), "coefficients": [[list(c) for c in each] for each in table.coefficients]}
+    return {"kind": KIND, "parameters": ours, "table": rows}
+
+
+def build(model: dict[str, Any]) -> Switched:
+    """The system of a certificate. Raises InputError for another kind, and for what cannot be."""
+    parameters, control, table = parts(model)
+    return switched(*controlled(parameters, table, *times(control)))
+
+
+def parts(model: dict[str, Any]) -> tuple[Parameters, ControlParameters, GainTable]:
+    """Parameters, control and gain table of a model; raises InputError as `build`."""
+    if set(model) != {"kind", "parameters", "table"} or model["kind"] != KIND:
+        raise InputError(f"model: wanted the kind {KIND!r}, parameters and a table, got {', '.join(sorted(model))}")
+    parameters = checked_parameters(model["parameters"], {**KINDS, **CONTROL}, "car, road or controller")
+    try:
+        control = control_parameters(parameters)
+        car_of(parameters), road_parameters(parameters)
+        table = _table(model["table"], ENTRIES[str(parameters.get(DESIGN.name, DESIGN.start))])
+    except (ParameterError, LookupError, TypeError, ValueError) as error:
+        raise InputError(f"model: {error}") from error
+    _refuse_endless(control)
+    return parameters, control, table
+
+
+def _table(content: Any, entries: int) -> GainTable:
+    strict.of_keys(content, ("edges", "coefficients"))
+    edges, coefficients = strict.numbers(content["edges"], 1), strict.numbers(content["coefficients"], 3)
+    if coefficients.shape != (len(edges) - 1, entries, DEGREE + 1):
+        raise ValueError(f"{len(edges)} edges of a gain table with coefficients of the shape {coefficients.shape}")
+    if edges[0] != 0.0 or not np.all(np.diff(edges) > 0.0):
+        raise ValueError("the edges of a gain table must rise from 0.0")
+    return GainTable.of({"edges": edges.tolist(), "coefficients": coefficients.tolist(), "settled": False})
 
 
 def as_gain(K: Array) -> Array:
@@ -65,7 +148,7 @@ def as_gain(K: Array) -> Array:
 
 
 def controlled(
-    parameters: Parameters, table: GainTable | None, begin: fmpq, end: fmpq
+    parameters: Parameters, table: GainTable, begin: fmpq, end: fmpq
 ) -> tuple[ExactSystem, Callable[..., Sequence[Any]], Excess]:
     """The car with inputs w = (h, ḣ, K), K row by row as in the table, and the rates of its linear part.
 
@@ -73,9 +156,9 @@ def controlled(
     """
     car = car_of(parameters)
     road, equations = exact_system(car, road_parameters(parameters)), car_equations(exact_car(car), None)
-    n = 0 if table is None else len(table.coefficients[0])
-    shares = [np.argwhere(g).tolist() for g in (as_gain(row) for row in np.eye(n))]
+    n = len(table.coefficients[0])
     values = [as_gain(row) for row in np.eye(n)]
+    shares = [np.argwhere(value).tolist() for value in values]
     plain = ExactSystem(14, 12, equations, road.pieces, road.period)
     zeros = [arb(0)] * 14, [arb(0)] * 12
     A, B = jacobian(plain, *zeros), jacobian(plain, *zeros, inputs=True)
@@ -106,8 +189,7 @@ def controlled(
                 gain[strut][state] += k * arb(float(value[strut, state]))
         return gain
 
-    pieces = road.pieces if table is None else _with_gains(road, table, begin, end, n)
-    return ExactSystem(14, 8 + n, full, pieces, road.period), linear, excess
+    return ExactSystem(14, 8 + n, full, _with_gains(road, table, begin, end, n), road.period), linear, excess
 
 
 def _times(A: arb_mat, x: Sequence[Any], B: arb_mat, w: Sequence[Any]) -> list[Any]:
@@ -146,9 +228,3 @@ def _with_gains(
         return w
 
     return tuple((at, inputs(at)) for at in begins)
-
-
-def largest_delta(found: Measured, norm: Norm) -> float:
-    """The largest δ, to 1 %, for which a tube is proved; 0.0 if there is none."""
-    x_lin = np.stack([piece.linear[:, 0] for piece in found.pieces], axis=1)
-    return largest(lambda delta: found.epsilon(norm, delta), float(norm(x_lin).max()) or 1.0)

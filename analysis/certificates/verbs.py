@@ -20,7 +20,6 @@ def add_verbs(verbs: Any, scenario: str) -> None:
     kind = verb.add_mutually_exclusive_group()
     kind.add_argument("--quick", action="store_true", help="a coarse floor in about a second, by comparison")
     kind.add_argument("--largest", action="store_true", help="also search the largest amplitude that can be certified")
-    kind.add_argument("--closed-loop", action="store_true", help="under control for ever, and against no control")
     kind.add_argument("--bounded", type=float, metavar="A", help="every road with |h| <= A [m] instead, around rest")
     sampled = "every road through the heights of this CSV instead (time, h_fl ... h_rr) that is of --road-class"
     kind.add_argument("--sampled", type=Path, metavar="ROAD.csv", help=sampled)
@@ -28,6 +27,13 @@ def add_verbs(verbs: Any, scenario: str) -> None:
         "--road-class", metavar="CLASS", help="between rows: curv:H2 (|h''| <= H2) or lip:H1 (|h'| <= H1)"
     )
     verb.add_argument("--slope", type=float, metavar="V", help="with --bounded: roads with |dh/dt| <= V [m/s] too")
+    closed = (
+        "under control for ever, and by time on its horizon (CERT.horizon.json), against no control; with --sampled"
+    )
+    verb.add_argument("--closed-loop", action="store_true", help=f"{closed}: for ever")
+    verb.add_argument(
+        "--fmu-starts", type=int, default=0, metavar="N", help="also try N starts within delta on the FMUs"
+    )
     verb.set_defaults(do=_certify)
 
     verb = verbs.add_parser("verify", help="prove a certificate's claims anew")
@@ -57,10 +63,11 @@ def _certify(options: argparse.Namespace) -> int:
         raise InputError(f"--slope {options.slope!r}: wanted --bounded with it")
     if (options.sampled is None) is not (options.road_class is None):
         raise InputError("wanted both --sampled and --road-class, or neither: rows say nothing of the road between")
+    _refuse_mixed(options)
     if options.sampled is not None:
         from .car_sampled_roads import command as through_rows
 
-        return through_rows(scenario.parameters, options.sampled, options.road_class, options.out)
+        return through_rows(scenario.parameters, options.sampled, options.road_class, options.out, options.closed_loop)
     if options.bounded is not None:
         from .car_bounded_roads import command
 
@@ -75,14 +82,28 @@ def _certify(options: argparse.Namespace) -> int:
         return quick_answer(scenario.parameters)
     from .certificate_command import make_certificate
 
-    return make_certificate(scenario.parameters, options.out, search=options.largest)
+    return make_certificate(scenario, options.out, search=options.largest, starts=options.fmu_starts)
+
+
+def _refuse_mixed(options: argparse.Namespace) -> None:
+    """Raise InputError for options that do not go together."""
+    others = options.quick or options.bounded is not None
+    if options.closed_loop and (others or options.largest):
+        raise InputError("--closed-loop: wanted alone or with --sampled")
+    if options.fmu_starts and (others or options.closed_loop or options.sampled is not None):
+        raise InputError(
+            f"--fmu-starts {options.fmu_starts}: wanted with a certificate of the scenario's own road only"
+        )
+    if options.fmu_starts < 0:
+        raise InputError(f"--fmu-starts {options.fmu_starts}: wanted a number of starts")
 
 
 def _certify_run(folder: Path, options: argparse.Namespace) -> int:
     from .certified_run import certify_run
 
     others = options.bounded, options.sampled, options.road_class
-    if options.out or options.quick or options.largest or options.closed_loop or any(o is not None for o in others):
+    switches = options.quick, options.largest, options.closed_loop, options.fmu_starts, options.out
+    if any(switches) or any(o is not None for o in others):
         raise InputError(f"{folder}: a run folder is certified without options; for them give {folder / RECORD}")
     if reason := certify_run(read_run(folder), folder):
         print(f"no certificate: {reason}")
