@@ -10,8 +10,6 @@ from math import isfinite
 from typing import Any
 from xml.etree.ElementTree import Element
 
-from pythonfmu.enums import Fmi2Status
-
 from .description import completed
 from .quantities import PARAMETERS, ParameterError, Quantity, refuse
 from .variables import Variables
@@ -147,7 +145,7 @@ class Slave(Variables):
                 self.recall(memory)
 
     def _discard(self, why: str) -> bool:
-        self.log(f"{self.instance_name}: {why}", Fmi2Status.error, "logStatusError")
+        self._say(why)
         return False
 
     # ------------------------------------------------------------------ FMI calls: state

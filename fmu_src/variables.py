@@ -161,9 +161,18 @@ class Variables(Fmi2Slave):
         At an exception PythonFMU gives up its references to the instance, to its class and to its log, and once more
         when the instance is freed; without the references that are added here the second time frees them under use.
         """
-        self.log(f"{self.instance_name}: {why}", Fmi2Status.error, "logStatusError")
+        self._say(why)
         if not self._failed:
             self._failed = True
             for held in (self, type(self), self.log_queue):
                 ctypes.pythonapi.Py_IncRef(ctypes.py_object(held))
-            raise RuntimeError(why)
+            raise RuntimeError(printable(why))  # PythonFMU logs it, too
+
+    def _say(self, why: str) -> None:
+        """Log a refusal."""
+        self.log(printable(f"{self.instance_name}: {why}"), Fmi2Status.error, "logStatusError")
+
+
+def printable(text: str) -> str:
+    """The text as FMI wants a message to be: a format for printf, in which a bare % would end the host."""
+    return text.replace("%", "%%")

@@ -9,7 +9,20 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from foreign_runs import COUNT, LATE, LATE_ITEMS, SAME, STATE_NAMES, STEP, STOP, Runner, Value, error, ours, small
+from foreign_runs import (
+    COUNT,
+    LATE,
+    LATE_ITEMS,
+    SAME,
+    STATE_NAMES,
+    STEP,
+    STOP,
+    Runner,
+    Value,
+    error,
+    ours,
+    small,
+)
 from foreign_systems import parameter_set, with_own_output, with_parameters
 from small_master import Ways, deviation
 
@@ -106,6 +119,12 @@ RUNAWAY: dict[str, dict[str, Value]] = {"vehicle": {"b1": 1e9}, "controller": {"
 def test_libcosim_stops_at_a_refused_step_and_quotes_the_fmu(system: Path, foreign: Runner, tmp_path: Path) -> None:
     with pytest.raises(AssertionError, match=r"(?s)ended with 1:.*vehicle: step .*finite numbers"):
         foreign("run_libcosimpy.py", with_parameters(system, tmp_path / "x.ssp", "x", RUNAWAY), 5, "RESULT")
+
+
+def test_libcosim_quotes_a_refusal_with_its_percent_signs(system: Path, foreign: Runner, tmp_path: Path) -> None:
+    refused = with_parameters(system, tmp_path / "x.ssp", "x", {"road": {"profile": "100%s%n"}})
+    with pytest.raises(AssertionError, match=r"initialization: profile = '100%s%n': wanted one of bump"):
+        foreign("run_libcosimpy.py", refused, 1, "RESULT")
 
 
 def test_ecos_goes_on_after_a_refused_step_and_finds_the_last_good_state(

@@ -16,7 +16,20 @@ import build
 
 ANY = st.floats(allow_nan=True, allow_infinity=True) | st.sampled_from([0.0, 1e-3, 0.01, 1.0, 1e300, -1e300, 5e-324])
 STEPS = st.sampled_from([0.0, 1e-9, 1e-3, 1e-3, 1e-3, 0.01, 0.3, 5.0, 1e6, 1e300]) | ANY
-STRINGS = ["end", "start", "bump", "fourier", "infinite", "full-car", "semi-active", "estimate", "at t_on", "", "ψ"]
+STRINGS = [
+    "end",
+    "start",
+    "bump",
+    "fourier",
+    "infinite",
+    "full-car",
+    "semi-active",
+    "estimate",
+    "at t_on",
+    "",
+    "ψ",
+    "%s%n",
+]
 TIMES = st.sampled_from([0.0, 1e-3, 0.25, 100.0, -5.0]) | ANY
 
 

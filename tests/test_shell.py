@@ -14,6 +14,7 @@ from fmpy import extract
 from host import DISCARD, FATAL, OK, Host
 
 import build
+from fmu_src.road.road_excitation import RoadExcitation
 
 MODELS = list(build.MODELS)
 H = 1e-3
@@ -233,6 +234,33 @@ def test_what_may_not_be_set_or_read_is_refused_once_and_the_host_lives(
     for _ in range(3):
         assert act(host) == OK  # PythonFMU itself ends the process at a second exception
     assert host.step(3 * H, H) == DISCARD
+
+
+@pytest.mark.parametrize("text", ["100%s%n", "50%d", "%", "%%"])
+def test_a_message_is_no_format_whatever_is_quoted_in_it(unpacked: dict[str, Path], text: str) -> None:
+    """A logger hands it to printf, with the value of a string and the instance's name in it."""
+    code = (
+        f"import sys; sys.path[:0] = [{str(ROOT)!r}, {str(ROOT / 'tests')!r}]\n"
+        "from pathlib import Path\nfrom host import Host\n"
+        f"host = Host(Path({str(unpacked['RoadExcitation'])!r}), name='road ' + sys.argv[1])\n"
+        "host.set_string(host.reference['profile'], sys.argv[1])\n"
+        "print(host.start(), host.step(-1.0, 1e-3), host.step(0.0, -1.0))\n"
+        "print(*host.log, sep='\\n', flush=True)\nhost.free()\nimport os; os._exit(0)\n"
+    )
+    done = subprocess.run([sys.executable, "-c", code, text], capture_output=True, text=True, timeout=120)
+    assert done.returncode == 0, done.stderr
+    statuses, first, second = done.stdout.splitlines()
+    assert statuses == f"{FATAL} {DISCARD} {DISCARD}"
+    assert first.startswith(f"road {text}: initialization: profile = {text!r}: wanted one of")
+    assert second.startswith("Fatal py exception")
+
+
+def test_nor_is_the_text_of_the_exception_by_which_a_call_is_refused() -> None:
+    """PythonFMU logs that, too, where no Python logger comes before."""
+    road = RoadExcitation(instance_name="road", resources="")
+    road.set_string([len(road.outputs) + len(road.reals)], ["100%s%n"])
+    with pytest.raises(RuntimeError, match="profile = '100%%s%%n': wanted one of"):
+        road.exit_initialization_mode()
 
 
 def test_a_state_of_another_fmu_and_garbage_are_refused(load: Loader) -> None:
