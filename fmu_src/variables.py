@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import ctypes
-from collections.abc import Sequence
+import weakref
+from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Any, ClassVar
 
@@ -21,6 +21,7 @@ from pythonfmu import (
 from pythonfmu.enums import Fmi2Status
 
 from .description import LOG_CATEGORIES
+from .interrupts import Messages, again, keep, unbroken
 from .quantities import PARAMETERS, Choice, Quantity
 
 
@@ -56,7 +57,9 @@ class Variables(Fmi2Slave):
         self.time = 0.0
         self._stale = True  # outputs are older than inputs, parameters or start values
         self._running = False
-        self._failed = False
+        self.failed = False  # it has raised an exception, and does nothing any more
+        self._messages: Callable[[], Messages | None] = _nobody
+        self._put_off: object = None  # an interrupt that is to strike after the present call
         self._reals: dict[int, tuple[list[float], int]] = {}  # where the value of each reference lies
         self._register()
 
@@ -86,38 +89,51 @@ class Variables(Fmi2Slave):
 
     def get_real(self, vrs: list[int]) -> list[float]:
         """Values by reference; all outputs at once take no loop."""
-        if self._stale:
-            self._refresh()
-        if vrs == self._output_refs:
-            return self.y
         try:
+            if self._stale:
+                self._refresh()
+            if vrs == self._output_refs:
+                return self.y
             return [cells[i] for cells, i in map(self._reals.__getitem__, vrs)]
         except KeyError:
-            return [float(value) for value in self._read(vrs, Real)]
+            return self._read(vrs, Real)
+        except BaseException as interrupt:
+            self.put_off(interrupt)
+            return self.get_real(vrs)
 
+    @unbroken
     def get_integer(self, vrs: list[int]) -> list[int]:
         return [int(value) for value in self._read(vrs, Integer)]
 
+    @unbroken
     def get_boolean(self, vrs: list[int]) -> list[bool]:
         return [bool(value) for value in self._read(vrs, Boolean)]
 
+    @unbroken
     def get_string(self, vrs: list[int]) -> list[str]:
         return [str(value) for value in self._read(vrs, String)]
 
     def set_real(self, vrs: list[int], values: Sequence[float]) -> None:
         """Set values by reference; all inputs at once take no loop."""
-        if vrs == self._input_refs:
-            self._stale = True
-            self.u[:] = values
-        else:
-            self._write(vrs, values, Real)
+        try:
+            if vrs == self._input_refs:
+                self._stale = True
+                self.u[:] = values
+            else:
+                self._write(vrs, values, Real)
+        except BaseException as interrupt:
+            self.put_off(interrupt)
+            self.set_real(vrs, values)
 
+    @unbroken
     def set_integer(self, vrs: list[int], values: Sequence[int]) -> None:
         self._write(vrs, values, Integer)
 
+    @unbroken
     def set_boolean(self, vrs: list[int], values: Sequence[bool]) -> None:
         self._write(vrs, values, Boolean)
 
+    @unbroken
     def set_string(self, vrs: list[int], values: Sequence[str]) -> None:
         self._write(vrs, values, String)
 
@@ -156,21 +172,36 @@ class Variables(Fmi2Slave):
         raise NotImplementedError
 
     def _refuse(self, why: str) -> None:
-        """Refuse a call that has no status of its own: by an exception, the only way PythonFMU leaves, and only once.
-
-        At an exception PythonFMU gives up its references to the instance, to its class and to its log, and once more
-        when the instance is freed; without the references that are added here the second time frees them under use.
-        """
+        """Refuse a call that has no status of its own: by an exception, PythonFMU's only way, and only once."""
         self._say(why)
-        if not self._failed:
-            self._failed = True
-            for held in (self, type(self), self.log_queue):
-                ctypes.pythonapi.Py_IncRef(ctypes.py_object(held))
+        if not self.failed:
+            self.failed = True
+            keep(self, type(self), self._messages())
             raise RuntimeError(printable(why))  # PythonFMU logs it, too
 
-    def _say(self, why: str) -> None:
-        """Log a refusal."""
-        self.log(printable(f"{self.instance_name}: {why}"), Fmi2Status.error, "logStatusError")
+    def _say(self, why: str, cause: BaseException | None = None, status: Fmi2Status = Fmi2Status.error) -> None:
+        """Log why something is refused; if the cause is an interrupt, it strikes again after this call."""
+        self.log(printable(f"{self.instance_name}: {why}"), status, "logStatusError")
+        if cause is not None and not isinstance(cause, Exception):
+            self._put_off = again(cause, self.log_queue[-1])
+
+    def put_off(self, interrupt: BaseException) -> None:
+        """Let an interrupt strike after the present call; an exception of another kind is raised at once."""
+        if isinstance(interrupt, Exception):
+            raise interrupt
+        words = f"{interrupt!r} fell into a call, which was completed; it goes on to the host"
+        self._say(words, interrupt, Fmi2Status.warning)
+
+    @unbroken
+    def _get_log_queue(self) -> Messages:
+        """The log for the library, which calls this once, and then alone holds it."""
+        messages = Messages(self)
+        self._messages, self.log_queue = weakref.ref(messages), weakref.proxy(messages)
+        return messages
+
+
+def _nobody() -> None:
+    """There is no library yet that has asked for the log."""
 
 
 def printable(text: str) -> str:

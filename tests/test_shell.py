@@ -6,6 +6,7 @@ import subprocess
 import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from time import sleep
 
 import numpy as np
 import pytest
@@ -15,6 +16,7 @@ from host import DISCARD, FATAL, OK, Host
 
 import build
 from fmu_src.road.road_excitation import RoadExcitation
+from fmu_src.vehicle.vehicle7dof import Vehicle7DOF
 
 MODELS = list(build.MODELS)
 H = 1e-3
@@ -284,6 +286,141 @@ def test_the_state_of_an_instance_that_has_failed_is_refused(load: Loader) -> No
     assert "that of an instance that has failed" in " ".join(host.log)
 
 
+# ------------------------------------------------------------------ interrupts
+def interrupted(model: str, method: str, monkeypatch: pytest.MonkeyPatch) -> list[int]:
+    """Let Ctrl-C strike once in a method of the code that the FMUs of this model run; the list then has an entry."""
+    base = next(
+        found.__mro__[1]
+        for name, module in sys.modules.items()
+        if name.startswith(f"{model.lower()}_") and (found := getattr(module, model, None))
+    )
+    plain, struck = getattr(base, method), list[int]()
+
+    def strike(self: object, *arguments: object) -> object:
+        result = plain(self, *arguments)
+        if not struck:
+            struck.append(1)
+            raise KeyboardInterrupt
+        return result
+
+    monkeypatch.setattr(base, method, strike)
+    return struck
+
+
+@pytest.mark.parametrize("model", MODELS)
+def test_an_interrupt_in_a_step_refuses_it_and_goes_on_to_the_host(
+    load: Loader, model: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    host, honest = begun(load, model), begun(load, model)
+    drive(host, 0, 10)
+    drive(honest, 0, 10)
+    expected = drive(honest, 10, 20)
+    with monkeypatch.context() as patch:
+        struck = interrupted(model, "advance", patch)
+        with pytest.raises(KeyboardInterrupt):
+            host.step(10 * H, H)
+    assert struck
+    assert "t = 0.01 s: KeyboardInterrupt(); the state at t = 0.01 s is kept" in host.log[-1]
+    assert drive(host, 10, 20) == expected
+
+
+@pytest.mark.parametrize("method", ["feed_through", "memory"])
+def test_an_interrupt_in_another_call_is_put_off_until_it_is_complete(
+    load: Loader, method: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    host, honest = begun(load, "Vehicle7DOF"), begun(load, "Vehicle7DOF")
+    for each in (host, honest):
+        each.set({"force_fl": 10.0})
+    expected = honest.get()
+    with monkeypatch.context() as patch:
+        struck = interrupted("Vehicle7DOF", method, patch)
+        with pytest.raises(KeyboardInterrupt):
+            host.get()
+    assert struck and not host.log  # what is no refusal is a warning
+    assert host.get() == expected
+    assert drive(host, 0, 10) == drive(honest, 0, 10)
+
+
+def test_an_interrupted_initialization_is_not_complete_and_can_be_made_anew(
+    load: Loader, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    host, honest = load("Vehicle7DOF"), begun(load, "Vehicle7DOF")
+    host.set_string(host.reference["road_sampling"], "end")
+    interrupted("Vehicle7DOF", "begin", monkeypatch)
+    with pytest.raises(KeyboardInterrupt):
+        host.start()
+    assert "initialization: KeyboardInterrupt()" in host.log[-1]
+    assert host.step(0.0, H) == DISCARD
+    assert host.status("ExitInitializationMode") == OK
+    assert drive(host, 0, 5) == drive(honest, 0, 5)
+
+
+def test_serialized_states_survive_interrupts(monkeypatch: pytest.MonkeyPatch) -> None:
+    car = Vehicle7DOF(instance_name="car", resources="")
+    state, times = car._get_fmu_state(), []
+
+    def interrupt(*_: object) -> bytes:
+        times.append(1)
+        if len(times) == 1:
+            raise KeyboardInterrupt
+        return b""
+
+    monkeypatch.setattr("fmu_src.slave.json.dumps", lambda *_, **__: interrupt() or "{}")
+    with pytest.raises(KeyboardInterrupt):
+        assert len(car._fmu_state_to_bytes(state)) == 34
+        while True:
+            sleep(0.001)
+
+
+STRUCK = """
+import gc, os, signal, sys
+sys.path[:0] = {path!r}
+from pathlib import Path
+from fmpy.fmi1 import FMICallException
+from host import FATAL, Host
+gc.disable()
+clean = 0
+folder, way = Path(sys.argv[1]), sys.argv[2]
+for life in range(40):
+    host = Host(folder)
+    assert host.start() == 0
+    if way == "at once":  # before the first instruction of a call, where nothing in it can catch it
+        kind = next(k for n, m in sys.modules.items() if n.startswith("vehicle7dof_") and (k := m.Vehicle7DOF))
+        def strike(self, *_):
+            raise KeyboardInterrupt
+        kind.do_step = strike
+        assert host.step(0.0, 1e-3) == FATAL
+        del kind.do_step
+        assert host.step(0.0, 1e-3) == 2 and len(host.get()) == 29
+    else:
+        signal.signal(signal.SIGALRM, signal.default_int_handler)
+        signal.setitimer(signal.ITIMER_REAL, 0.001 + 0.0001 * life)
+        try:
+            for k in range(100_000):
+                assert host.set({{"h_fl": 0.0}}) == host.step(0.001 * k, 0.001) == 0
+                host.get("body.heave")
+        except KeyboardInterrupt:
+            clean += 1
+        except (AssertionError, FMICallException):  # it struck before the first instruction of a call
+            assert host.step(0.0, 1e-3) == 2 and "Fatal py exception" in host.log[0], host.log
+        signal.setitimer(signal.ITIMER_REAL, 0.0)
+    host.free()
+    litter = [dict(a=i) for i in range(2000)]
+assert way == "at once" or clean > 20, clean
+print("alive", flush=True)
+os._exit(0)
+"""
+
+
+@pytest.mark.parametrize("way", ["at once", "anywhere"])
+def test_interrupts_leave_the_host_alive_wherever_they_strike(unpacked: dict[str, Path], way: str) -> None:
+    code = STRUCK.format(path=[str(ROOT), str(ROOT / "tests")])
+    command = [sys.executable, "-c", code, str(unpacked["Vehicle7DOF"]), way]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=120)
+    assert (done.returncode, done.stdout) == (0, "alive\n"), done.stderr
+
+
+# ------------------------------------------------------------------ many lives
 def test_200_lives_in_one_process_leave_nothing_behind(dist: Path, tmp_path: Path) -> None:
     """Instantiate, run, free; memory after the first 50 against memory at the end; no folder of ours left."""
     code = (
