@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+import pythonfmu
 from conftest import ROOT
 from fmpy.cross_check.validate_vendor_repo import validate_test_fmu
 from lxml import etree
@@ -258,7 +259,7 @@ for model in build.MODELS:
 
 
 def test_another_folder_at_another_time_gives_the_same_bytes(dist: Path, tmp_path: Path) -> None:
-    """The sources copied elsewhere, built by a user with another home, style, time zone and language."""
+    """The sources copied elsewhere, built by a user with another home, style, time zone, language and processor."""
     copy, made = tmp_path / "else where" / "sources", tmp_path / "made"
     for folder in (copy, made):
         folder.mkdir(parents=True)
@@ -267,9 +268,35 @@ def test_another_folder_at_another_time_gives_the_same_bytes(dist: Path, tmp_pat
         shutil.copy(ROOT / name, copy)
     (copy / "matplotlibrc").write_text("font.size: 20\naxes.facecolor: black\nsavefig.dpi: 30\n")
     user = {"HOME": str(tmp_path), "TZ": "Pacific/Kiritimati", "LC_ALL": "C", "PYTHONHASHSEED": "7"}
+    user |= {"OPENBLAS_CORETYPE": "Nehalem"}  # rounds the products of matrices in another way
     command = [sys.executable, "-c", ELSEWHERE, str(made)]
     done = subprocess.run(command, cwd=copy, env={**os.environ, **user}, capture_output=True, text=True, timeout=300)
     assert done.returncode == 0, done.stdout + done.stderr
     for model in build.MODELS:
         assert contents(made, model) == contents(dist, model)  # says which entry differs, if one does
         assert (made / f"{model}.fmu").read_bytes() == (dist / f"{model}.fmu").read_bytes()
+
+
+def test_the_guid_is_that_of_all_that_acts(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A host may take what has the same guid for the same: our code, stored designs, PythonFMU with its libraries."""
+    package, library = tmp_path / "fmu_src", tmp_path / "pythonfmu"
+    shutil.copytree(build.PACKAGE, package, ignore=shutil.ignore_patterns("__pycache__"))
+    shutil.copytree(Path(pythonfmu.__file__).parent, library)
+    guids = {model: build._identity(model, package) for model in build.MODELS}
+    monkeypatch.setattr(pythonfmu, "__file__", str(library / "__init__.py"))
+
+    def changed() -> list[str]:
+        return [model for model, guid in guids.items() if build._identity(model, package) != guid]
+
+    assert changed() == []
+    design = package / build.DESIGNS / "lqr_design.json"
+    for path, models in (
+        (design, ["LqrController"]),
+        (package / "vehicle" / "equations.py", list(build.MODELS)),
+        (library / "resources" / "binaries" / "linux64" / "libpythonfmu-export.so", list(build.MODELS)),
+        (library / "fmi2slave.py", list(build.MODELS)),
+    ):
+        kept = path.read_bytes()
+        path.write_bytes(kept + b" ")
+        assert changed() == models, path
+        path.write_bytes(kept)

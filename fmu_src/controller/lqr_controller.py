@@ -46,7 +46,7 @@ class LqrController(Slave):
                 raise _lacking("feedback = 'estimate' needs a filter, whose computation", missing) from missing
 
     def _designed(self, p: ControlParameters) -> Design:
-        """The design for these parameters: the one at hand, the one that was stored at build time, or a new one."""
+        """The design for these parameters: the one at hand, the one that is stored in the resources, or a new one."""
         span = p.end - p.begin
         at_hand = stored(Path(self.resources) / FILE_NAMES[type(p.model)]) if self.resources else None
         for known in (self._design, at_hand):
