@@ -20,6 +20,7 @@ from pythonfmu import (
 )
 from pythonfmu.enums import Fmi2Status
 
+from .access import Reader, Writer, reader, remember, writer
 from .description import LOG_CATEGORIES
 from .interrupts import Messages, again, keep, unbroken
 from .quantities import PARAMETERS, Choice, Quantity
@@ -61,6 +62,8 @@ class Variables(Fmi2Slave):
         self._messages: Callable[[], Messages | None] = _nobody
         self._put_off: object = None  # an interrupt that is to strike after the present call
         self._reals: dict[int, tuple[list[float], int]] = {}  # where the value of each reference lies
+        self._reading: dict[tuple[int, ...], Reader] = {}  # lists of references
+        self._writing: dict[tuple[int, ...], Writer] = {}  # that have passed
         self._register()
 
     def _register(self) -> None:
@@ -76,9 +79,6 @@ class Variables(Fmi2Slave):
             self._declare(String, choice, self.chosen, i, **parameter)
         for i, (name, text) in enumerate(self.switches.items()):
             self._declare(Boolean, Choice(name=name, values=("true", "false"), text=text), self.on, i, **parameter)
-        nu, ny = len(self.inputs), len(self.outputs)
-        self._input_refs = list(range(nu))
-        self._output_refs = list(range(nu, nu + ny))
 
     def _declare(self, kind: type, what: Quantity | Choice, cells: list, index: int, **attributes: object) -> None:
         getter, setter = partial(cells.__getitem__, index), partial(cells.__setitem__, index)
@@ -88,18 +88,44 @@ class Variables(Fmi2Slave):
             self._reals[variable.value_reference] = (cells, index)
 
     def get_real(self, vrs: list[int]) -> list[float]:
-        """Values by reference; all outputs at once take no loop."""
+        """Values by reference."""
         try:
             if self._stale:
                 self._refresh()
-            if vrs == self._output_refs:
-                return self.y
-            return [cells[i] for cells, i in map(self._reals.__getitem__, vrs)]
+            cells, values = self._reading[(*vrs,)]
+            return [*values(cells)]
         except KeyError:
-            return self._read(vrs, Real)
+            return self._first_reading(vrs)
         except BaseException as interrupt:
             self.put_off(interrupt)
             return self.get_real(vrs)
+
+    def set_real(self, vrs: list[int], values: Sequence[float]) -> None:
+        """Set values by reference."""
+        try:
+            stretch, order = self._writing[(*vrs,)]
+            self._stale = True
+            self.u[stretch] = order(values) if order else values
+        except KeyError:
+            self._first_writing(vrs, values)
+        except BaseException as interrupt:
+            self.put_off(interrupt)
+            self.set_real(vrs, values)
+
+    @unbroken
+    def _first_reading(self, vrs: list[int]) -> list[float]:
+        """Read by a list of references that is new, and remember how; it may be refused."""
+        values = [float(value) for value in self._read(vrs, Real)]
+        if vrs and not self.failed:
+            remember(self._reading, vrs, reader([self._reals[vr] for vr in vrs]))
+        return values
+
+    @unbroken
+    def _first_writing(self, vrs: list[int], values: Sequence[float]) -> None:
+        """Write by a list of references that is new and, if all are inputs, remember how; it may be refused."""
+        self._write(vrs, values, Real)
+        if vrs and not self.failed and max(vrs) < len(self.u):
+            remember(self._writing, vrs, writer(vrs, self.u))
 
     @unbroken
     def get_integer(self, vrs: list[int]) -> list[int]:
@@ -112,18 +138,6 @@ class Variables(Fmi2Slave):
     @unbroken
     def get_string(self, vrs: list[int]) -> list[str]:
         return [str(value) for value in self._read(vrs, String)]
-
-    def set_real(self, vrs: list[int], values: Sequence[float]) -> None:
-        """Set values by reference; all inputs at once take no loop."""
-        try:
-            if vrs == self._input_refs:
-                self._stale = True
-                self.u[:] = values
-            else:
-                self._write(vrs, values, Real)
-        except BaseException as interrupt:
-            self.put_off(interrupt)
-            self.set_real(vrs, values)
 
     @unbroken
     def set_integer(self, vrs: list[int], values: Sequence[int]) -> None:
