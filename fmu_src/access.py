@@ -13,10 +13,8 @@ from typing import Any
 
 Cells = list[float]
 Reader = tuple[Cells, Callable[[Cells], Any]]  # cells, and a function of them that gives the values
-# a stretch of cells, and what of the values comes into it (None: the values themselves)
+# a stretch of cells, and what of the values comes into it; None: the values themselves
 Writer = tuple[slice, Callable[[Sequence[float]], Any] | None]
-    slice, Callable[[Sequence[float]], Any] | None
-]  # a stretch of cells, and what comes into it of the values
 MOST = 256  # lists that are remembered
 
 
