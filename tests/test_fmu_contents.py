@@ -165,6 +165,46 @@ def test_texts_say_what_is_needed(dist: Path, model: str) -> None:
     assert ("control>=" in needs) == (model == "LqrController")
 
 
+WITHOUT_NUMPY = """
+import sys
+sys.modules.update(dict.fromkeys(("numpy", "scipy", "control")))
+from fmu_src.controller.lqr_controller import LqrController
+from fmu_src.quantities import PARAMETERS
+
+def needs(design, *changed, feedback="states"):
+    c = LqrController(instance_name="c", resources=sys.argv[1])
+    c.chosen[2], c.chosen[4] = design, feedback
+    for name in changed:
+        c.p[c.reals.index(name)] += 1.0 if name == "seed" else 1.0 + 0.01 * PARAMETERS[name].start
+    try:
+        c.exit_initialization_mode()
+    except RuntimeError as refusal:
+        assert "not installed" in str(refusal), refusal
+        return True
+    return False
+
+pairs = {"m21": ["m22"], "m22": ["m21"]}  # the car takes no others
+for design in ("half-car", "full-car"):
+    print(*(name for name in LqrController.reals if needs(design, name, *pairs.get(name, []))))
+print(needs("half-car", "sample_time", feedback="estimate"), needs("full-car", "sample_time", "force_limit"))
+"""
+
+
+def test_just_what_is_said_to_need_other_packages_needs_them(dist: Path, tmp_path: Path) -> None:
+    files = contents(dist, "LqrController")
+    said = " ".join(files["documentation/externalDependencies.txt"].decode().split())
+    for name in ("lqr_design.json", "lqr_design_full_car.json"):
+        (tmp_path / name).write_bytes(files[f"resources/{name}"])
+    command = [sys.executable, "-c", WITHOUT_NUMPY, str(tmp_path)]
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=120)
+    assert done.returncode == 0, done.stderr
+    half_car, full_car, rest = (line.split() for line in done.stdout.splitlines())
+    for design, needing in (("half-car", half_car), ("full-car", full_car)):
+        (listed,) = re.findall(f'design = "{design}" with another value of (.*?);', said)
+        assert sorted(listed.split(", ")) == sorted(needing)
+    assert rest == ["True", "False"] and 'feedback = "estimate"' in said
+
+
 def test_pythonfmu_deploy_installs_what_other_designs_need(dist: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     installed: list[str] = []
 

@@ -11,6 +11,7 @@ from xml.etree.ElementTree import fromstring
 
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
+from ..controller.law import CAR, HALF_CAR, WEIGHTS
 from . import controller_drawing, drawing, reference, road_drawing, system_drawing, vehicle_drawing
 from .formulas import with_formulas
 from .reader import Description, describe
@@ -47,7 +48,13 @@ def extra_entries(fmu: Path) -> dict[str, bytes]:
     entries = {
         "model.png": picture,
         "documentation/index.html": _page(description, picture),
-        "documentation/externalDependencies.txt": _render("externalDependencies.txt", description, requirements=needed),
+        "documentation/externalDependencies.txt": _render(
+            "externalDependencies.txt",
+            description,
+            requirements=needed,
+            half_car=HALF_CAR,
+            full_car=dict.fromkeys([*CAR, *WEIGHTS]),
+        ),
         "documentation/fmi-ls-ref.txt": _render(
             "fmi-ls-ref.txt",
             description,
