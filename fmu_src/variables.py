@@ -23,7 +23,7 @@ from pythonfmu.enums import Fmi2Status
 from .access import Reader, Writer, reader, remember, writer
 from .description import LOG_CATEGORIES
 from .interrupts import Messages, again, keep, unbroken
-from .quantities import PARAMETERS, Choice, Quantity
+from .quantities import PARAMETERS, TABLE, Choice, Quantity
 
 
 class Variables(Fmi2Slave):
@@ -175,10 +175,12 @@ class Variables(Fmi2Slave):
             return f"setting {kind.__name__} variables: there is none of value reference {vr}"
         if variable.causality == Fmi2Causality.input:
             return None
+        unit = f" {TABLE[variable.name].unit}" if kind is Real else ""
+        said = f"{variable.name} = {value!r}{unit}"
         if variable.causality == Fmi2Causality.output and variable.initial != Fmi2Initial.exact:
-            return f"setting {variable.name} = {value!r}: it is an output"
+            return f"setting {said}: it is an output"
         if self._running:
-            return f"setting {variable.name} = {value!r}: wanted before the end of initialization"
+            return f"setting {said}: wanted before the end of initialization"
         return None
 
     def _refresh(self) -> None:

@@ -218,9 +218,10 @@ def test_bad_parameters_are_refused_at_the_end_of_initialization(
 @pytest.mark.parametrize(
     ("act", "said"),
     [
-        (lambda h: h.set({"body.heave_acceleration": 1.0}), "body.heave_acceleration = 1.0: it is an output"),
-        (lambda h: h.set({"m": 900.0}), "m = 900.0: wanted before the end of initialization"),
-        (lambda h: h.set({"body.heave": 0.1}), "body.heave = 0.1: wanted before the end of initialization"),
+        (lambda h: h.set({"body.heave_acceleration": 1.0}), "body.heave_acceleration = 1.0 m/s2: it is an output"),
+        (lambda h: h.set({"m": 900.0}), "m = 900.0 kg: wanted before the end of initialization"),
+        (lambda h: h.set({"body.heave": 0.1}), "body.heave = 0.1 m: wanted before the end of initialization"),
+        (lambda h: h.set_string(h.reference["road_sampling"], "end"), "road_sampling = 'end': wanted before"),
         (lambda h: h.set_real([4711], [1.0]), "none of value reference 4711"),
         (lambda h: h.real(4711)[0], "none of value reference [4711]"),
         (lambda h: h.set_real([h.reference["road_sampling"]], [1.0]), "setting Real variables: there is none"),
