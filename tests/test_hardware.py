@@ -364,6 +364,7 @@ def test_a_filter_that_needs_missing_packages_says_what_to_install_and_stored_de
         "    c.chosen[:] = ['finite', 'at t_on', 'full-car', 'semi-active', feedback]\n"
         "    c.p[c.reals.index('sample_time')] = 0.01\n"
         "    c.p[c.reals.index('actuator_lag')] = 0.01\n"
+        "    c.setup_experiment(0.3)\n"
         "    try:\n        c.exit_initialization_mode()\n        c.u[:] = [0.01] * 14\n"
         "        print(c.do_step(0.3, 0.1), c.do_step(0.4, 0.1), any(c.y))\n"
         "    except RuntimeError as refusal: print(refusal)\n"

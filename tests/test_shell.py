@@ -155,6 +155,28 @@ def test_a_long_step_over_all_corners_arrives_at_the_right_road(load: Loader) ->
     np.testing.assert_allclose(jump.get()[:8], walk.get()[:8], atol=1e-12)
 
 
+def test_the_road_follows_a_jump_in_time_with_steps_of_no_length_too(load: Loader) -> None:
+    jumping, there = load("RoadExcitation"), load("RoadExcitation")
+    assert jumping.start() == there.start(time=0.01) == OK
+    assert jumping.step(0.01, 0.0) == OK
+    assert jumping.get() == there.get()
+    assert jumping.step(0.01, H) == there.step(0.01, H) == OK
+    assert jumping.get() == there.get()
+    assert max(map(abs, jumping.get()[8:])) < 1e-6  # bows of a step of 1 ms, not of the way from 0
+
+
+@pytest.mark.parametrize("model", ["Vehicle7DOF", "LqrController"])
+@pytest.mark.parametrize(("t", "h"), [(7.0, H), (0.004, H), (7.0, 0.0)])
+def test_what_has_a_state_refuses_to_jump_in_time(load: Loader, model: str, t: float, h: float) -> None:
+    host, honest = begun(load, model), begun(load, model)
+    assert drive(host, 0, 5) == drive(honest, 0, 5)
+    assert host.step(t, h) == DISCARD
+    assert f"wanted a step from t = 0.005 s, which was reached, got one from {t!r} s" in host.log[-1]
+    host.set({name: 1e-3 * np.sin(5 + i) for i, name in enumerate(host.inputs)})
+    assert host.step(5 * H + 1e-12, H) == OK  # as sums of steps are
+    assert drive(honest, 5, 6)[0] == host.get()
+
+
 # ------------------------------------------------------------------ refusals
 @pytest.mark.parametrize("value", [float("nan"), float("inf"), float("-inf")])
 def test_an_input_that_is_not_finite_is_refused_and_can_be_repaired(load: Loader, value: float) -> None:
