@@ -36,6 +36,7 @@ class Variables(Fmi2Slave):
     choices: ClassVar[tuple[Choice, ...]] = ()
     switches: ClassVar[dict[str, str]] = {}  # Boolean parameters, true by default: name -> words
     dependencies: ClassVar[dict[str, tuple[str, ...]]] = {}  # output -> inputs that it depends on within a step
+    initially: ClassVar[dict[str, tuple[str, ...]]] = {}  # output -> start values and parameters; default: all
     guid: object
     identity: ClassVar[str] = ""  # hash of the code, set by the slave script of an exported FMU
 

@@ -8,6 +8,16 @@ from ..quantities import CORNER_WORDS, CORNERS, ROAD
 from ..slave import Slave
 from .profiles import HARMONICS, PROFILE, RoadParameters, road
 
+DELAYS = dict(zip(CORNERS, ((), ("tau0",), ("a", "b"), ("a", "b", "tau0")), strict=True))
+INITIALLY = {
+    **{
+        f"{kind}_{corner}": ("profile", "A", "Lambda", "v0", "t_start", *delay, *HARMONICS, f"excite_{corner}")
+        for kind in ("h", "dh")
+        for corner, delay in DELAYS.items()
+    },
+    **{f"bow_{corner}": () for corner in CORNERS},  # there is no step yet
+}
+
 
 class RoadExcitation(Slave):
     """Heights, rates and bows under the wheels at the present time; a function of time alone."""
@@ -20,6 +30,8 @@ class RoadExcitation(Slave):
         f"excite_{corner}": f"whether the profile lies in the track of the {words} wheel; flat if not"
         for corner, words in zip(CORNERS, CORNER_WORDS, strict=True)
     }
+
+    initially: ClassVar[dict[str, tuple[str, ...]]] = INITIALLY
 
     def configure(self) -> None:
         p = self.parameters()
