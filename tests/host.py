@@ -65,6 +65,10 @@ class Host:
             return int(failure.status)
         return OK
 
+    def tried(self, method: str, *arguments: Any) -> int:
+        """Call a method of fmpy's instance."""
+        return self._tried(getattr(self.fmu, method), *arguments)
+
     def set_string(self, reference: int, text: str) -> int:
         return self._tried(self.fmu.setString, [reference], [text])
 

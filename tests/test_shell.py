@@ -209,6 +209,22 @@ def test_a_step_that_would_never_end_is_refused(load: Loader) -> None:
     assert "internal steps of h_max = 0.0005 s" in host.log[-1]
 
 
+def test_a_step_that_is_found_out_at_its_very_end_is_undone(load: Loader) -> None:
+    """The rate of the road at the end of a step is asked for by the outputs alone, when the state is a step ahead."""
+    pair = [load("Vehicle7DOF"), load("Vehicle7DOF")]
+    for host in pair:
+        host.set_string(host.reference["road_sampling"], "end")
+        assert host.start(bp1=100.0) == OK
+    host, honest = pair
+    assert drive(host, 0, 10) == drive(honest, 0, 10)
+    before = host.get()
+    assert host.set({"dh_fl": 1e308}) == OK
+    assert host.step(10 * H, H) == DISCARD
+    assert "wheel_fl.heave_acceleration = inf m/s2" in host.log[-1]
+    assert host.get() == before
+    assert drive(host, 10, 20) == drive(honest, 10, 20)
+
+
 @pytest.mark.parametrize(
     ("model", "values", "said"),
     [
