@@ -26,7 +26,8 @@ STAMP = ENVIRONMENT / "installed.json"
 DIST = ROOT / "dist"
 PACKAGE = ROOT / "fmu_src"
 SYSTEM = PACKAGE / "system"
-LEFT_OUT = ("__pycache__", "export", "system")  # of the package, in an FMU: not needed while it steps
+LEFT_OUT = ("__pycache__", "designs", "export", "system")  # of the package, in an FMU: not needed while it steps
+DESIGNS = "controller/designs"  # of the package: the default controllers, which go into the controller's resources
 CURE = PACKAGE / "export" / "library.py"  # what is done to PythonFMU's library
 
 # FMU (also the name of its class) -> the module that holds the class
@@ -145,25 +146,23 @@ def build_fmu(model: str, package: Path, target: Path) -> None:
     """Export one model of the package with pythonfmu; the same sources give the same bytes.
 
     The package goes into the resources under a name that carries the hash of its content, with a slave script whose
-    name carries it too: a host process can then hold two versions. The hash also covers how PythonFMU's library is
-    changed. Documentation and reference results (of a run of the FMU just made) are added at the end and have no part
-    in it.
+    name carries it too: a host process can then hold two versions, and one that goes by the guid keeps them apart.
+    Documentation and reference results (of a run of the FMU just made) are added at the end and have no part in it.
     """
     from pythonfmu import FmuBuilder
 
     from fmu_src.export.contents import extra_entries
     from fmu_src.export.library import cured
 
-    identity = hashlib.sha256(f"{model} {ENTRY} {_content_hash([package, CURE], LEFT_OUT)}".encode()).hexdigest()[:32]
+    identity = _identity(model, package)
     name = f"fmu_src_{identity[:12]}"
     with tempfile.TemporaryDirectory(prefix="build_fmu_") as temporary:
         folder = Path(temporary)
         shutil.copytree(package, folder / name, ignore=shutil.ignore_patterns(*LEFT_OUT))
         script = folder / f"{model.lower()}_{identity[:12]}.py"
         script.write_text(ENTRY.format(model=model, module=MODELS[model], package=name, identity=identity))
-        files = [folder / name]
-        if model == "LqrController":
-            files += store_default_designs(folder)
+        files: list[Path] = [folder / name]
+        files += [Path(shutil.copy(design, folder)) for design in _designs(model, package)]
         try:
             made = FmuBuilder.build_FMU(script, folder / "made", project_files=files)
         finally:
@@ -176,13 +175,31 @@ def build_fmu(model: str, package: Path, target: Path) -> None:
     write_archive(target, contents)
 
 
-def store_default_designs(folder: Path) -> list[Path]:
-    """Design the controller for the default parameters, so that the FMU as shipped needs no numeric library."""
+def _designs(model: str, package: Path) -> list[Path]:
+    """The files of designs that the FMU holds, so that as shipped it needs no numeric library.
+
+    They are sources: what a numeric library makes of the equations differs in its last digits from machine to machine.
+    """
+    return sorted((package / DESIGNS).iterdir()) if model == "LqrController" else []
+
+
+def renew_designs() -> None:
+    """Design the default controllers anew; wanted when the default car, or the way they are designed, has changed."""
     from fmu_src.controller.design import design, store
     from fmu_src.controller.fullcar import FullCar
     from fmu_src.controller.halfcar import HalfCar
 
-    return [store(design(car, infinite=True, span=float("inf")), folder) for car in (HalfCar(), FullCar())]
+    for car in (HalfCar(), FullCar()):
+        store(design(car, infinite=True, span=float("inf")), PACKAGE / DESIGNS)
+
+
+def _identity(model: str, package: Path) -> str:
+    """Hash of all that acts in an FMU: our code, designs, slave script, PythonFMU, and what is changed in its library."""
+    import pythonfmu
+
+    parts = [model, ENTRY, _content_hash([package], LEFT_OUT), _content_hash([*_designs(model, package), CURE])]
+    parts += [_content_hash([Path(pythonfmu.__file__).parent], ("__pycache__", "tests"))]
+    return hashlib.sha256(" ".join(parts).encode()).hexdigest()[:32]
 
 
 def write_archive(target: Path, contents: dict[str, bytes]) -> None:

@@ -28,8 +28,8 @@ from .errors import InputError
 from .layout import lay_out
 from .scenario import Scenario
 from .trajectory import Array, Run, Trajectory
-from .units import SAME, Conversion
-from .wiring import Port, Wiring, conversions, read_wiring
+from .units import SAME, Conversion, Unit
+from .wiring import Port, Wiring, conversions, examine
 
 DEFAULT_SYSTEM = Path(__file__).resolve().parents[1] / "dist" / "VehicleOnRoad.ssp"
 CHUNK = 64  # steps between two looks at the progress bar and at Ctrl-C
@@ -48,8 +48,9 @@ def simulate(scenario: Scenario, system: Path = DEFAULT_SYSTEM, *, progress: boo
     with contextlib.ExitStack() as stack:
         folder = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="cosimulation_")))
         caught = stack.enter_context(_deferred_signals())
-        wiring, components = _load(system, folder, stack)
-        table = _Table(components, wiring, scenario)
+        loaded = _load(system, folder, stack)
+        components = loaded.components
+        table = _Table(loaded, scenario)
         _initialize(components, scenario)
         parameters = {name: c.parameters() for name, c in components.items()}
         trajectory = table.fill(caught, progress)
@@ -58,7 +59,7 @@ def simulate(scenario: Scenario, system: Path = DEFAULT_SYSTEM, *, progress: boo
         "scenario": scenario.as_json(),
         "parameters": parameters,
         "fmus": {
-            name: {"file": Path(wiring.sources[name]).name, "sha256": c.sha256, "guid": c.guid}
+            name: {"file": Path(loaded.wiring.sources[name]).name, "sha256": c.sha256, "guid": c.guid}
             for name, c in components.items()
         },
         "versions": {
@@ -70,8 +71,21 @@ def simulate(scenario: Scenario, system: Path = DEFAULT_SYSTEM, *, progress: boo
     return Run(trajectory=trajectory, record=record)
 
 
-def _load(system: Path, folder: Path, stack: contextlib.ExitStack) -> tuple[Wiring, dict[str, Component]]:
-    """Instantiate the components of the system, unpacked into the folder; the stack frees them."""
+@dataclass(frozen=True, slots=True)
+class _System:
+    """A system that can be run: its wiring, its instances, and what takes the numbers of sources to those of inputs."""
+
+    wiring: Wiring
+    components: dict[str, Component]
+    units: dict[Port, Unit]
+    conversions: dict[Port, Conversion]
+
+
+def _load(system: Path, folder: Path, stack: contextlib.ExitStack) -> _System:
+    """Instantiate the components of the system, unpacked into the folder; the stack frees them.
+
+    Raises InputError with all that is wrong with structure, FMUs, connectors and units.
+    """
     place = system
     if not system.is_dir():
         place = folder / "system"
@@ -79,20 +93,38 @@ def _load(system: Path, folder: Path, stack: contextlib.ExitStack) -> tuple[Wiri
             fmpy.extract(system, place)
         except Exception as error:  # fmpy raises bare Exceptions; zipfile its own
             raise InputError(f"{system}: cannot be unpacked: {error}") from error
-    wiring = read_wiring(place / "SystemStructure.ssd", system / "SystemStructure.ssd")
+    wiring, faults = examine(place / "SystemStructure.ssd", system / "SystemStructure.ssd")
     outside = [s for s in wiring.sources.values() if not (place / s).resolve().is_relative_to(place.resolve())]
     if outside:
-        raise InputError(f"{system}: wanted FMUs inside it, got links that lead elsewhere: {', '.join(outside)}")
+        faults.append(f"{system}: wanted FMUs inside it, got links that lead elsewhere: {', '.join(outside)}")
     components: dict[str, Component] = {}
     for name, source in wiring.sources.items():
-        component = Component(name, place / source, folder / "fmus" / str(len(components)))
-        stack.callback(component.free)
-        components[name] = component
-    ends = [*((p, "input") for p in wiring.feeds), *((p, "output") for p in wiring.feeds.values())]
-    lacking = {f"{p} ({kind})" for p, kind in ends if p.variable not in components[p.component].named(kind)}
+        if source not in outside:
+            try:
+                components[name] = Component(name, place / source, folder / "fmus" / str(len(components)))
+            except InputError as error:
+                faults.append(str(error))
+                continue
+            stack.callback(components[name].free)
+    lacking = _lacking(wiring, components)
     if lacking:
-        raise InputError(f"{system}: its FMUs lack these of its connectors: {', '.join(sorted(lacking))}")
-    return wiring, components
+        named = ", ".join(sorted(f"{port} ({kind})" for port, kind in lacking.items()))
+        faults.append(f"{system}: its FMUs lack these of its connectors: {named}")
+    fmus = {Port(name, v): unit for name, c in components.items() for v, unit in c.units.items()}
+    found, unconvertible = conversions(wiring, {port: unit for port, unit in fmus.items() if port not in lacking})
+    if faults or unconvertible:
+        raise InputError("\n".join([*faults, *unconvertible]))
+    return _System(wiring, components, {**wiring.units, **fmus}, found)
+
+
+def _lacking(wiring: Wiring, components: dict[str, Component]) -> dict[Port, str]:
+    """Connectors that are wired and that their FMUs, as far as they are there, do not have: which kind was wanted."""
+    ends = [*((p, "input") for p in wiring.feeds), *((p, "output") for p in wiring.feeds.values())]
+    return {
+        p: kind
+        for p, kind in ends
+        if p.component in components and p.variable not in components[p.component].named(kind)
+    }
 
 
 def _initialize(components: dict[str, Component], scenario: Scenario) -> None:
@@ -121,16 +153,16 @@ class _Stage:
 class _Table:
     """The rows of one run, and the loop that fills them."""
 
-    def __init__(self, components: dict[str, Component], wiring: Wiring, scenario: Scenario) -> None:
-        self.components, self.scenario = components, scenario
+    def __init__(self, system: _System, scenario: Scenario) -> None:
+        components, wiring = system.components, system.wiring
+        self.components, self.units, self.scenario = components, system.units, scenario
         self.outputs = {name: c.named("output") for name, c in components.items()}
         self.recorded = self._recorded(scenario.record)
         self.inputs = {name: [p.variable for p in wiring.feeds if p.component == name] for name in components}
         feeds = {name: [wiring.feeds[Port(name, v)] for v in inputs] for name, inputs in self.inputs.items()}
-        fmus = {Port(name, v): unit for name, c in components.items() for v, unit in c.units.items()}
-        self.units = {**wiring.units, **fmus}
-        found = conversions(wiring, fmus)
-        self.converted = {name: _arrays([found[Port(name, v)] for v in inputs]) for name, inputs in self.inputs.items()}
+        self.converted = {
+            name: _arrays([system.conversions[Port(name, v)] for v in inputs]) for name, inputs in self.inputs.items()
+        }
         self.layout = lay_out(self.outputs, feeds, list(components), scenario.coupling)
         span = scenario.stop_time - scenario.start_time
         self.whole = round(span / scenario.step)  # steps of full length

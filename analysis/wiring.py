@@ -42,11 +42,19 @@ class Wiring:
 
 
 def read_wiring(path: Path, shown: Path | None = None) -> Wiring:
-    """Read a SystemStructure.ssd, which faults call `shown`. Raises InputError with every fault, each with its line.
+    """Read a SystemStructure.ssd, which faults call `shown`. Raises InputError with every fault, each with its line."""
+    wiring, faults = examine(path, shown or path)
+    if faults:
+        raise InputError("\n".join(faults))
+    return wiring
 
-    Outputs of the system itself may be connected, and are left alone; an input of its own has no source here.
+
+def examine(path: Path, shown: Path) -> tuple[Wiring, list[str]]:
+    """The wiring of a SystemStructure.ssd as far as it can be made out, and every fault in it, with its line.
+
+    Outputs of the system itself may be connected, and are left alone; an input of its own has no source here. Raises
+    InputError for a file that cannot be read as a system structure.
     """
-    shown = shown or path
     parser = etree.XMLParser(resolve_entities=False, no_network=True, load_dtd=False, huge_tree=False)
     try:
         root = etree.parse(str(path), parser).getroot()
@@ -54,33 +62,32 @@ def read_wiring(path: Path, shown: Path | None = None) -> Wiring:
         raise InputError(f"{shown}: cannot be read as a system structure: {error}") from error
     components = list(root.iterfind(".//ssd:Component", _NS))
     faults = [] if components else [f"{shown}: wanted at least one component, got none"]
-    faults += [f"{shown}:{c.sourceline}: {fault}" for c in components for fault in _component_faults(c, components)]
+    found = {c: _component_faults(c, components) for c in components}
+    faults += [f"{shown}:{c.sourceline}: {fault}" for c, each in found.items() for fault in each]
     connectors = _connectors(root, components, shown, faults)
     kinds = {port: connector.get("kind", "") for port, connector in connectors.items()}
     units = _units(root, connectors, shown, faults)
     connections = _connections(root, kinds, shown, faults)
     inputs = [port for port, kind in kinds.items() if kind == "input" and port.component]
+    fed = [port for port in inputs if port in connections]
     faults += [
-        f"{shown}:{connectors[port].sourceline}: the input {port} has no source"
-        for port in inputs
-        if port not in connections
+        f"{shown}:{connectors[port].sourceline}: the input {port} has no source" for port in inputs if port not in fed
     ]
-    if faults:
-        raise InputError("\n".join(faults))
-    return Wiring(
-        sources={c.get("name", ""): c.get("source", "") for c in components},
-        feeds={port: _end(connections[port], "start") for port in inputs},
-        places={port: f"{shown}:{connections[port].sourceline}" for port in inputs},
+    wiring = Wiring(
+        sources={c.get("name", ""): c.get("source", "") for c, each in found.items() if not each},
+        feeds={port: _end(connections[port], "start") for port in fed},
+        places={port: f"{shown}:{connections[port].sourceline}" for port in fed},
         units=units,
-        unconverted=frozenset(p for p in inputs if connections[p].get("suppressUnitConversion") in ("true", "1")),
+        unconverted=frozenset(p for p in fed if connections[p].get("suppressUnitConversion") in ("true", "1")),
     )
+    return wiring, faults
 
 
-def conversions(wiring: Wiring, fmus: Mapping[Port, Unit]) -> dict[Port, Conversion]:
-    """For each input what takes its source's numbers to its own; `fmus`: units of the FMUs' variables that have one.
+def conversions(wiring: Wiring, fmus: Mapping[Port, Unit]) -> tuple[dict[Port, Conversion], list[str]]:
+    """For each input what takes its source's numbers to its own, and every fault.
 
-    A connector in another unit than its FMU's variable changes nothing as long as it can be converted; it stands in
-    where the FMU says none, and where neither does numbers pass as they are. Raises InputError with every fault.
+    `fmus`: units of the FMUs' variables that have one. A connector in another unit than its FMU's variable changes
+    nothing as long as it can be converted; it stands in where the FMU says none, and where neither does numbers pass.
     """
     faults: list[str] = []
     found = {}
@@ -95,9 +102,7 @@ def conversions(wiring: Wiring, fmus: Mapping[Port, Unit]) -> dict[Port, Convers
             if conversion(a, b) is None
         ]
         found[end] = (conversion(chain[0][1], chain[-1][1]) if chain else None) or SAME
-    if faults:
-        raise InputError("\n".join(faults))
-    return found
+    return found, faults
 
 
 def _connectors(
@@ -118,14 +123,14 @@ def _units(
     root: etree._Element, connectors: dict[Port, etree._Element], shown: Path, faults: list[str]
 ) -> dict[Port, Unit]:
     """The units of the connectors, from the definitions in the file; what is wrong with them joins the faults."""
-    defined = {}
+    defined: dict[str, Unit | None] = {}  # None: at fault, which is said once
     for definition in root.iterfind("ssd:Units/ssc:Unit", _NS):
         name, base = definition.get("name", ""), definition.find("ssc:BaseUnit", _NS)
         try:
             defined[name] = unit(name, None if base is None else {str(k): str(v) for k, v in base.attrib.items()})
         except ValueError as error:
             faults.append(f"{shown}:{definition.sourceline}: {error}")
-            defined[name] = Unit(name)
+            defined[name] = None
     found = {}
     for port, connector in connectors.items():
         real = connector.find("ssc:Real", _NS)
@@ -136,7 +141,8 @@ def _units(
                 faults.append(
                     f"{shown}:{connector.sourceline}: {port}: wanted a unit of the file's Units ({known}), got {said!r}"
                 )
-            found[port] = defined.get(said, Unit(said))
+            if (known_unit := defined.get(said)) is not None:
+                found[port] = known_unit
     return found
 
 

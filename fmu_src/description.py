@@ -47,8 +47,7 @@ def _describe(real: Element, q: Quantity) -> None:
     for name, limit in (("min", low), ("max", q.high)):
         if abs(limit) < float("inf"):
             real.set(name, repr(limit))
-    if q.nominal != 1.0:
-        real.set("nominal", repr(q.nominal))
+    real.set("nominal", repr(q.nominal))
     if "start" in real.attrib:
         real.set("start", repr(float(q.start)))
 
@@ -72,7 +71,7 @@ def _structure(structure: Element, slave: Slave) -> None:
         through = [index[name] for name in slave.dependencies.get(q.name, ())]
         _unknown(outputs, index[q.name], through)
         if i >= slave.settable:
-            _unknown(initial, index[q.name], through + [index[name] for name in given])
+            _unknown(initial, index[q.name], through + [index[name] for name in slave.initially.get(q.name, given)])
 
 
 def _unknown(parent: Element, index: int, dependencies: list[int]) -> None:

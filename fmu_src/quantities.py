@@ -14,7 +14,10 @@ from math import inf, pi
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Quantity:
-    """A real variable: `low` and `high` are its limits (`low` itself excluded if `positive`)."""
+    """A real variable: `low` and `high` are its limits (`low` itself excluded if `positive`).
+
+    `scale` is the typical size of its values, where that is not the size of its start value.
+    """
 
     name: str
     unit: str
@@ -24,14 +27,19 @@ class Quantity:
     low: float = -inf
     high: float = inf
     positive: bool = False
-    nominal: float = 1.0
+    scale: float = 0.0
+
+    @property
+    def nominal(self) -> float:
+        """Typical size of the values: what is said, or that of the start value."""
+        return self.scale or abs(self.start) or 1.0
 
     @property
     def description(self) -> str:
         """Words and the paper's symbol, in plain text, for the FMI description."""
         primed = re.sub(r"\\(d+)ot ?\{?(\\?\w+?)\}?(_|$)", lambda m: m[2] + "'" * len(m[1]) + m[3], self.symbol)
         plain = re.sub(r"[{}_]|\\", "", primed)
-        return f"{self.text} ({plain})"
+        return f"{self.text} ({plain}){', > 0' if self.positive else ''}"
 
     def fault(self, value: float) -> str | None:
         """What is wrong with this value, in words; None if nothing is."""
@@ -95,18 +103,16 @@ def _accented(accent: str, symbol: str) -> str:
     return rf"\{accent}{{{letter}}}" + (f"_{index}" if index else "")
 
 
-def _corner_quantities(name: str, unit: str, symbol: str, text: str, nominal: float) -> tuple[Quantity, ...]:
+def _corner_quantities(name: str, unit: str, symbol: str, text: str, scale: float) -> tuple[Quantity, ...]:
     return tuple(
-        Quantity(
-            name=name.format(corner), unit=unit, symbol=symbol.format(index), text=f"{text}, {words}", nominal=nominal
-        )
+        Quantity(name=name.format(corner), unit=unit, symbol=symbol.format(index), text=f"{text}, {words}", scale=scale)
         for corner, index, words in zip(CORNERS, WHEEL_INDICES, CORNER_WORDS, strict=True)
     )
 
 
 # ------------------------------------------------------------------ the vehicle: q, q', q'' in the paper's order
 POSITIONS = (
-    Quantity(name="body.heave", unit="m", symbol=r"z", text="body heave, up", nominal=0.01),
+    Quantity(name="body.heave", unit="m", symbol=r"z", text="body heave, up", scale=0.01),
     Quantity(
         name="body.roll",
         unit="rad",
@@ -114,7 +120,7 @@ POSITIONS = (
         text="body roll, left side up",
         low=-pi / 2,
         high=pi / 2,
-        nominal=0.01,
+        scale=0.01,
     ),
     Quantity(
         name="body.pitch",
@@ -123,11 +129,11 @@ POSITIONS = (
         text="body pitch, nose down",
         low=-pi / 2,
         high=pi / 2,
-        nominal=0.01,
+        scale=0.01,
     ),
-    Quantity(name="wheel_fl.heave", unit="m", symbol=r"z_{11}", text="front left wheel heave, up", nominal=0.01),
-    Quantity(name="wheel_fr.heave", unit="m", symbol=r"z_{12}", text="front right wheel heave, up", nominal=0.01),
-    Quantity(name="axle_r.heave", unit="m", symbol=r"z_2", text="rear axle heave, up", nominal=0.01),
+    Quantity(name="wheel_fl.heave", unit="m", symbol=r"z_{11}", text="front left wheel heave, up", scale=0.01),
+    Quantity(name="wheel_fr.heave", unit="m", symbol=r"z_{12}", text="front right wheel heave, up", scale=0.01),
+    Quantity(name="axle_r.heave", unit="m", symbol=r"z_2", text="rear axle heave, up", scale=0.01),
     Quantity(
         name="axle_r.roll",
         unit="rad",
@@ -135,7 +141,7 @@ POSITIONS = (
         text="rear axle roll, left side up",
         low=-pi / 2,
         high=pi / 2,
-        nominal=0.01,
+        scale=0.01,
     ),
 )
 RATES = tuple(
@@ -144,7 +150,7 @@ RATES = tuple(
         unit=f"{q.unit}/s",
         symbol=_accented("dot", q.symbol),
         text=f"rate of {q.text}",
-        nominal=0.1,
+        scale=0.1,
     )
     for q in POSITIONS
 )
@@ -155,7 +161,7 @@ ACCELERATIONS = tuple(
         unit=f"{q.unit}/s2",
         symbol=_accented("ddot", q.symbol),
         text=f"acceleration of {q.text}",
-        nominal=1.0,
+        scale=1.0,
     )
     for q in POSITIONS
 )
@@ -183,7 +189,12 @@ FORCES = _corner_quantities("force_{}", "N", r"u_{{{}}}", "actuator force, up on
 FULL_CAR_WEIGHTS = (
     Quantity(name="H2", unit="m", symbol="H_2", text="weight of roll against heave, full car", start=1.0, low=0.0),
     Quantity(
-        name="lambda_travel", unit="N2/m2", symbol=r"\lambda_s", text="weight of each strut's travel, full car", low=0.0
+        name="lambda_travel",
+        unit="N2/m2",
+        symbol=r"\lambda_s",
+        text="weight of each strut's travel, full car",
+        low=0.0,
+        scale=1e10,
     ),
     Quantity(
         name="lambda_tyre",
@@ -191,9 +202,15 @@ FULL_CAR_WEIGHTS = (
         symbol=r"\lambda_t",
         text="weight of each tyre's deflection, full car",
         low=0.0,
+        scale=1e10,
     ),
     Quantity(
-        name="lambda_hop", unit="N2.s2/m2", symbol=r"\lambda_w", text="weight of each wheel's speed, full car", low=0.0
+        name="lambda_hop",
+        unit="N2.s2/m2",
+        symbol=r"\lambda_w",
+        text="weight of each wheel's speed, full car",
+        low=0.0,
+        scale=1e8,
     ),
     Quantity(
         name="lambda_acceleration",
@@ -201,11 +218,26 @@ FULL_CAR_WEIGHTS = (
         symbol=r"\lambda_a",
         text="weight of heave acceleration, with H1 and H2 of pitch and roll acceleration, full car",
         low=0.0,
+        scale=1e6,
     ),
 )
 HARDWARE = (
-    Quantity(name="force_limit", unit="N", symbol="u_{max}", text="largest force of an actuator; 0: no limit", low=0.0),
-    Quantity(name="actuator_lag", unit="s", symbol=r"\tau_a", text="time constant of the actuators; 0: none", low=0.0),
+    Quantity(
+        name="force_limit",
+        unit="N",
+        symbol="u_{max}",
+        text="largest force of an actuator; 0: no limit",
+        low=0.0,
+        scale=1000.0,
+    ),
+    Quantity(
+        name="actuator_lag",
+        unit="s",
+        symbol=r"\tau_a",
+        text="time constant of the actuators; 0: none",
+        low=0.0,
+        scale=0.01,
+    ),
     Quantity(
         name="valve_damping",
         unit="N.s/m",
@@ -220,6 +252,7 @@ HARDWARE = (
         symbol="T_s",
         text="time between samples, whose forces are held; 0: every communication point",
         low=0.0,
+        scale=0.01,
     ),
     Quantity(
         name="sigma_acceleration",
@@ -268,8 +301,8 @@ PARAMETERS = {
         Quantity(name="cp2", unit="N/m", symbol="c_{p2}", text="rear tyre stiffness", start=160000.0, low=0.0),
         Quantity(name="b1", unit="N.s/m", symbol="b_1", text="front strut damping, each", start=1200.0, low=0.0),
         Quantity(name="b2", unit="N.s/m", symbol="b_2", text="rear strut damping, each", start=1100.0, low=0.0),
-        Quantity(name="bp1", unit="N.s/m", symbol="b_{p1}", text="front tyre damping", start=0.0, low=0.0),
-        Quantity(name="bp2", unit="N.s/m", symbol="b_{p2}", text="rear tyre damping", start=0.0, low=0.0),
+        Quantity(name="bp1", unit="N.s/m", symbol="b_{p1}", text="front tyre damping", start=0.0, low=0.0, scale=100.0),
+        Quantity(name="bp2", unit="N.s/m", symbol="b_{p2}", text="rear tyre damping", start=0.0, low=0.0, scale=100.0),
         Quantity(name="a", unit="m", symbol="a", text="centre of gravity to front axle", start=1.0, low=0.0),
         Quantity(name="b", unit="m", symbol="b", text="centre of gravity to rear axle", start=1.5, low=0.0),
         Quantity(name="s0", unit="m", symbol="s_0", text="half distance of the rear struts", start=0.60, low=0.0),
@@ -284,7 +317,13 @@ PARAMETERS = {
             name="t_start", unit="s", symbol="t_{A1}", text="time at which the front left wheel meets the profile"
         ),
         *(
-            Quantity(name=f"A_nu[{nu}]", unit="m", symbol=f"A_{{{nu}}}", text=f"Fourier amplitude of sin({nu} Omega t)")
+            Quantity(
+                name=f"A_nu[{nu}]",
+                unit="m",
+                symbol=f"A_{{{nu}}}",
+                text=f"Fourier amplitude of sin({nu} Omega t)",
+                scale=0.01,
+            )
             for nu in range(1, 9)
         ),
         Quantity(

@@ -10,11 +10,12 @@ from math import isfinite
 from typing import Any
 from xml.etree.ElementTree import Element
 
-from pythonfmu.enums import Fmi2Status
-
 from .description import completed
+from .interrupts import unbroken, unbroken_function
 from .quantities import PARAMETERS, ParameterError, Quantity, refuse
 from .variables import Variables
+
+SNAP = 1e-9  # relative to a second, or to the time: what a sum of steps may be off
 
 
 class StepError(Exception):
@@ -39,6 +40,14 @@ class Slave(Variables):
         """Make a step from t to t + step [s], step > 0; raise StepError if that cannot be done."""
         raise NotImplementedError
 
+    def jump(self, t: float) -> None:
+        """Go to a time t [s] other than that at which the last step ended; raise StepError if that cannot be done.
+
+        What has a state cannot: it would miss what happens between. The sums of steps that hosts make are let pass.
+        """
+        if abs(t - self.time) > SNAP * max(1.0, abs(t)):
+            raise StepError(f"wanted a step from t = {self.time!r} s, which was reached, got one from {t!r} s")
+
     def feed_through(self) -> None:
         """Renew those outputs that depend on inputs directly."""
 
@@ -54,13 +63,15 @@ class Slave(Variables):
         return dict(zip(self.reals, self.p, strict=True))
 
     # ------------------------------------------------------------------ FMI calls: time
+    @unbroken
     def setup_experiment(self, start_time: float, *_: object) -> None:
         """Take the start time [s]."""
         self.time = start_time
 
+    @unbroken
     def exit_initialization_mode(self) -> None:
         """Check all parameters and start values; refuse with every fault named."""
-        if self._failed or self._running:
+        if self.failed or self._running:
             return
         faults = [q.fault(x) for q, x in zip(self.outputs[: self.settable], self.y, strict=False)]
         faults += [None if isfinite(x) else f"{q.name} = {x!r} {q.unit}" for q, x in self._inputs()]
@@ -79,31 +90,44 @@ class Slave(Variables):
         except Exception as error:  # of whatever kind: it must not reach the library unprepared (see `_refuse`)
             self._refuse("initialization: " + "; ".join([*filter(None, faults), repr(error)]))
             return
+        except BaseException as interrupt:  # what it has begun may take long, or not bear being begun anew
+            self._say(f"initialization: {interrupt!r}; it is not at its end", interrupt)
+            return
         self._running, self._stale = True, False
 
+    @unbroken
     def do_step(self, current_time: float, step_size: float) -> bool:
         """One communication step; where it is refused False (fmi2Discard), a message, and the last good state."""
-        if self._failed:
+        if self.failed:
             return False
         if not self._running:
-            return self._discard("a step was asked for outside of initialized time")
+            self._say("a step was asked for outside of initialized time")
+            return False
         kept = (self.memory(), self.y[:], self.time)
         try:
             self._check_step(current_time, step_size)
+            if current_time != self.time:
+                self.jump(current_time)
             if step_size > 0.0:
                 self.advance(current_time, step_size)
             elif self._stale:
                 self.feed_through()
             if not isfinite(sum(self.y)):
                 refuse(None if isfinite(x) else f"{q.name} = {x!r} {q.unit}" for q, x in self._outputs())
-        except Exception as error:  # of whatever kind: the step is refused, and the component as it was before
+        except BaseException as error:  # of whatever kind: the step is refused, and the component as it was before
             memory, self.y[:], self.time = kept
             self.recall(memory)
-            what = f"step of {step_size:g} s from t = {current_time:g} s: {error}"
-            return self._discard(f"{what}; the state at t = {self.time:g} s is kept")
+            what = f"step of {step_size:g} s from t = {current_time:g} s: {str(error) or repr(error)}"
+            self._say(f"{what}; the state at t = {self.time:g} s is kept", error)
+            return False
         self.time, self._stale = current_time + step_size, False
         return True
 
+    @unbroken
+    def enter_initialization_mode(self) -> None:
+        """Nothing to do."""
+
+    @unbroken
     def terminate(self) -> None:
         """No steps from now on."""
         self._running = False
@@ -128,9 +152,9 @@ class Slave(Variables):
         Where they cannot be had (parameters at fault, inputs not finite) the last good ones stay: what is wrong is said
         at the end of initialization or at the next step, when the host has set all that it wants to set.
         """
-        if self._failed:
+        if self.failed:
             return
-        memory, y = self.memory() if self._running else None, self.y[:]
+        memory, y, good = self.memory() if self._running else None, self.y[:], False
         try:
             if not self._running:
                 self.configure()
@@ -138,35 +162,33 @@ class Slave(Variables):
             self.feed_through()
             good = isfinite(sum(self.y))
         except Exception:  # said at the end of initialization or at the next step, see above
-            good = False
-        if good:
-            self._stale = False
-        else:
-            self.y[:] = y
-            if memory is not None:
-                self.recall(memory)
-
-    def _discard(self, why: str) -> bool:
-        self.log(f"{self.instance_name}: {why}", Fmi2Status.error, "logStatusError")
-        return False
+            pass
+        finally:
+            if not good:
+                self.y[:] = y
+                if memory is not None:
+                    self.recall(memory)
+        self._stale = not good
 
     # ------------------------------------------------------------------ FMI calls: state
+    @unbroken
     def _get_fmu_state(self) -> dict[str, Any]:
         """The whole state as plain data: variables, time, phase and memory."""
         return {
             "identity": self.identity,
             "cells": [self.u[:], self.y[:], self.p[:], self.chosen[:], self.on[:]],
             "phase": [self.time, self._stale, self._running],
-            "failed": self._failed,
+            "failed": self.failed,
             "memory": self.memory() if self._running else None,
         }
 
+    @unbroken
     def _set_fmu_state(self, state: dict[str, Any]) -> None:
         """Return to a state of this or another instance of the same code."""
         try:
             if state["identity"] != self.identity:
                 raise ValueError("another FMU's")
-            if self._failed or state["failed"]:
+            if self.failed or state["failed"]:
                 raise ValueError(
                     "that of an instance that has failed" if state["failed"] else "this instance has failed"
                 )
@@ -179,12 +201,14 @@ class Slave(Variables):
             self._refuse(f"setting the state: wanted one that this FMU has given, got {error!r}")
 
     @staticmethod
+    @unbroken_function
     def _fmu_state_to_bytes(state: dict[str, Any]) -> bytes:
         """JSON (doubles as repr, so that they come back bit for bit) behind its SHA-256, by which damage is seen."""
         text = json.dumps(state, default=asdict).encode()
         return hashlib.sha256(text).digest() + text
 
     @staticmethod
+    @unbroken_function
     def _fmu_state_from_bytes(state: bytes) -> dict[str, Any]:
         """The state from its bytes; of bytes that `_fmu_state_to_bytes` has not made, one that will be refused."""
         digest, text = state[:32], state[32:]

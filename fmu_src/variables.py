@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import ctypes
-from collections.abc import Sequence
+import weakref
+from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Any, ClassVar
 
@@ -20,8 +20,10 @@ from pythonfmu import (
 )
 from pythonfmu.enums import Fmi2Status
 
+from .access import Reader, Writer, reader, remember, writer
 from .description import LOG_CATEGORIES
-from .quantities import PARAMETERS, Choice, Quantity
+from .interrupts import Messages, again, keep, unbroken
+from .quantities import PARAMETERS, TABLE, Choice, Quantity
 
 
 class Variables(Fmi2Slave):
@@ -34,6 +36,7 @@ class Variables(Fmi2Slave):
     choices: ClassVar[tuple[Choice, ...]] = ()
     switches: ClassVar[dict[str, str]] = {}  # Boolean parameters, true by default: name -> words
     dependencies: ClassVar[dict[str, tuple[str, ...]]] = {}  # output -> inputs that it depends on within a step
+    initially: ClassVar[dict[str, tuple[str, ...]]] = {}  # output -> start values and parameters; default: all
     guid: object
     identity: ClassVar[str] = ""  # hash of the code, set by the slave script of an exported FMU
 
@@ -56,8 +59,12 @@ class Variables(Fmi2Slave):
         self.time = 0.0
         self._stale = True  # outputs are older than inputs, parameters or start values
         self._running = False
-        self._failed = False
+        self.failed = False  # it has raised an exception, and does nothing any more
+        self._messages: Callable[[], Messages | None] = _nobody
+        self._put_off: object = None  # an interrupt that is to strike after the present call
         self._reals: dict[int, tuple[list[float], int]] = {}  # where the value of each reference lies
+        self._reading: dict[tuple[int, ...], Reader] = {}  # lists of references
+        self._writing: dict[tuple[int, ...], Writer] = {}  # that have passed
         self._register()
 
     def _register(self) -> None:
@@ -73,9 +80,6 @@ class Variables(Fmi2Slave):
             self._declare(String, choice, self.chosen, i, **parameter)
         for i, (name, text) in enumerate(self.switches.items()):
             self._declare(Boolean, Choice(name=name, values=("true", "false"), text=text), self.on, i, **parameter)
-        nu, ny = len(self.inputs), len(self.outputs)
-        self._input_refs = list(range(nu))
-        self._output_refs = list(range(nu, nu + ny))
 
     def _declare(self, kind: type, what: Quantity | Choice, cells: list, index: int, **attributes: object) -> None:
         getter, setter = partial(cells.__getitem__, index), partial(cells.__setitem__, index)
@@ -85,39 +89,66 @@ class Variables(Fmi2Slave):
             self._reals[variable.value_reference] = (cells, index)
 
     def get_real(self, vrs: list[int]) -> list[float]:
-        """Values by reference; all outputs at once take no loop."""
-        if self._stale:
-            self._refresh()
-        if vrs == self._output_refs:
-            return self.y
+        """Values by reference."""
         try:
-            return [cells[i] for cells, i in map(self._reals.__getitem__, vrs)]
+            if self._stale:
+                self._refresh()
+            cells, values = self._reading[(*vrs,)]
+            return [*values(cells)]
         except KeyError:
-            return [float(value) for value in self._read(vrs, Real)]
+            return self._first_reading(vrs)
+        except BaseException as interrupt:
+            self.put_off(interrupt)
+            return self.get_real(vrs)
 
+    def set_real(self, vrs: list[int], values: Sequence[float]) -> None:
+        """Set values by reference."""
+        try:
+            stretch, order = self._writing[(*vrs,)]
+            self._stale = True
+            self.u[stretch] = order(values) if order else values
+        except KeyError:
+            self._first_writing(vrs, values)
+        except BaseException as interrupt:
+            self.put_off(interrupt)
+            self.set_real(vrs, values)
+
+    @unbroken
+    def _first_reading(self, vrs: list[int]) -> list[float]:
+        """Read by a list of references that is new, and remember how; it may be refused."""
+        values = [float(value) for value in self._read(vrs, Real)]
+        if vrs and not self.failed:
+            remember(self._reading, vrs, reader([self._reals[vr] for vr in vrs]))
+        return values
+
+    @unbroken
+    def _first_writing(self, vrs: list[int], values: Sequence[float]) -> None:
+        """Write by a list of references that is new and, if all are inputs, remember how; it may be refused."""
+        self._write(vrs, values, Real)
+        if vrs and not self.failed and max(vrs) < len(self.u):
+            remember(self._writing, vrs, writer(vrs, self.u))
+
+    @unbroken
     def get_integer(self, vrs: list[int]) -> list[int]:
         return [int(value) for value in self._read(vrs, Integer)]
 
+    @unbroken
     def get_boolean(self, vrs: list[int]) -> list[bool]:
         return [bool(value) for value in self._read(vrs, Boolean)]
 
+    @unbroken
     def get_string(self, vrs: list[int]) -> list[str]:
         return [str(value) for value in self._read(vrs, String)]
 
-    def set_real(self, vrs: list[int], values: Sequence[float]) -> None:
-        """Set values by reference; all inputs at once take no loop."""
-        if vrs == self._input_refs:
-            self._stale = True
-            self.u[:] = values
-        else:
-            self._write(vrs, values, Real)
-
+    @unbroken
     def set_integer(self, vrs: list[int], values: Sequence[int]) -> None:
         self._write(vrs, values, Integer)
 
+    @unbroken
     def set_boolean(self, vrs: list[int], values: Sequence[bool]) -> None:
         self._write(vrs, values, Boolean)
 
+    @unbroken
     def set_string(self, vrs: list[int], values: Sequence[str]) -> None:
         self._write(vrs, values, String)
 
@@ -145,10 +176,12 @@ class Variables(Fmi2Slave):
             return f"setting {kind.__name__} variables: there is none of value reference {vr}"
         if variable.causality == Fmi2Causality.input:
             return None
+        unit = f" {TABLE[variable.name].unit}" if kind is Real else ""
+        said = f"{variable.name} = {value!r}{unit}"
         if variable.causality == Fmi2Causality.output and variable.initial != Fmi2Initial.exact:
-            return f"setting {variable.name} = {value!r}: it is an output"
+            return f"setting {said}: it is an output"
         if self._running:
-            return f"setting {variable.name} = {value!r}: wanted before the end of initialization"
+            return f"setting {said}: wanted before the end of initialization"
         return None
 
     def _refresh(self) -> None:
@@ -156,14 +189,38 @@ class Variables(Fmi2Slave):
         raise NotImplementedError
 
     def _refuse(self, why: str) -> None:
-        """Refuse a call that has no status of its own: by an exception, the only way PythonFMU leaves, and only once.
+        """Refuse a call that has no status of its own: by an exception, PythonFMU's only way, and only once."""
+        self._say(why)
+        if not self.failed:
+            self.failed = True
+            keep(self, type(self), self._messages())
+            raise RuntimeError(printable(why))  # PythonFMU logs it, too
 
-        At an exception PythonFMU gives up its references to the instance, to its class and to its log, and once more
-        when the instance is freed; without the references that are added here the second time frees them under use.
-        """
-        self.log(f"{self.instance_name}: {why}", Fmi2Status.error, "logStatusError")
-        if not self._failed:
-            self._failed = True
-            for held in (self, type(self), self.log_queue):
-                ctypes.pythonapi.Py_IncRef(ctypes.py_object(held))
-            raise RuntimeError(why)
+    def _say(self, why: str, cause: BaseException | None = None, status: Fmi2Status = Fmi2Status.error) -> None:
+        """Log why something is refused; if the cause is an interrupt, it strikes again after this call."""
+        self.log(printable(f"{self.instance_name}: {why}"), status, "logStatusError")
+        if cause is not None and not isinstance(cause, Exception):
+            self._put_off = again(cause, self.log_queue[-1])
+
+    def put_off(self, interrupt: BaseException) -> None:
+        """Let an interrupt strike after the present call; an exception of another kind is raised at once."""
+        if isinstance(interrupt, Exception):
+            raise interrupt
+        words = f"{interrupt!r} fell into a call, which was completed; it goes on to the host"
+        self._say(words, interrupt, Fmi2Status.warning)
+
+    @unbroken
+    def _get_log_queue(self) -> Messages:
+        """The log for the library, which calls this once, and then alone holds it."""
+        messages = Messages(self)
+        self._messages, self.log_queue = weakref.ref(messages), weakref.proxy(messages)
+        return messages
+
+
+def _nobody() -> None:
+    """There is no library yet that has asked for the log."""
+
+
+def printable(text: str) -> str:
+    """The text as FMI wants a message to be: a format for printf, in which a bare % would end the host."""
+    return text.replace("%", "%%")

@@ -19,7 +19,7 @@ OK, WARNING, DISCARD, ERROR, FATAL = range(5)
 class Host:
     """One instance of an unpacked FMU; every method returns the status of its call, or the value that it got."""
 
-    def __init__(self, folder: Path) -> None:
+    def __init__(self, folder: Path, name: str = "") -> None:
         description = read_model_description(folder, validate=False)
         self.reference = {v.name: v.valueReference for v in description.modelVariables}
         self.outputs = [v.name for v in description.modelVariables if v.causality == "output"]
@@ -28,7 +28,10 @@ class Host:
         self.log: list[str] = []
         logs[id(self.log)] = self.log
         self.fmu = FMU2Slave(
-            guid=description.guid, modelIdentifier=identifier, unzipDirectory=str(folder), instanceName=identifier
+            guid=description.guid,
+            modelIdentifier=identifier,
+            unzipDirectory=str(folder),
+            instanceName=name or identifier,
         )
         self.fmu.instantiate(callbacks=callbacks(id(self.log)), loggingOn=True)
 
@@ -61,6 +64,10 @@ class Host:
         except FMICallException as failure:
             return int(failure.status)
         return OK
+
+    def tried(self, method: str, *arguments: Any) -> int:
+        """Call a method of fmpy's instance."""
+        return self._tried(getattr(self.fmu, method), *arguments)
 
     def set_string(self, reference: int, text: str) -> int:
         return self._tried(self.fmu.setString, [reference], [text])

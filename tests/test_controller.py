@@ -19,6 +19,7 @@ from host import DISCARD, OK, Host
 from numpy.testing import assert_allclose
 from scipy.linalg import expm, solve_continuous_are
 
+from build import DESIGNS, PACKAGE
 from fmu_src.controller.design import FILE_NAMES, Design, design, problem, store, stored
 from fmu_src.controller.fullcar import FullCar
 from fmu_src.controller.halfcar import HalfCar, half_car_state, strut_forces
@@ -214,6 +215,19 @@ def test_a_design_that_needs_missing_packages_says_what_to_install() -> None:
     said = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True).stdout
     assert "not installed: numpy" in said
     assert "Install 'control'" in said
+
+
+@pytest.mark.parametrize("car", [HalfCar(), FullCar()])
+def test_a_fresh_design_of_a_default_car_is_the_one_among_the_sources(car: HalfCar | FullCar) -> None:
+    kept, fresh = stored(PACKAGE / DESIGNS / FILE_NAMES[type(car)]), design(car, infinite=True, span=float("inf"))
+    renew = "renew it: python -c 'import build; build.renew_designs()'"
+    assert kept is not None and kept.car == fresh.car, renew
+    assert kept.finite is not None and fresh.finite is not None
+    assert kept.finite.settled == fresh.finite.settled and len(kept.finite.edges) == len(fresh.finite.edges), renew
+    pairs = [(kept.infinite, fresh.infinite), (kept.finite.edges, fresh.finite.edges)]
+    for old, new in [*pairs, (kept.finite.coefficients, fresh.finite.coefficients)]:
+        a, b = np.array(old), np.array(new)
+        assert np.abs(a - b).max() < 1e-10 * np.abs(b).max(), renew
 
 
 @pytest.mark.parametrize("car", [HalfCar(), FullCar()])

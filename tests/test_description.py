@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import random
 import re
 import subprocess
 import sys
 import zipfile
 from math import inf
 from pathlib import Path
+from typing import Any
 
 import fmpy
 import numpy as np
@@ -15,10 +17,11 @@ import pytest
 from fmpy import extract, read_model_description
 from host import OK, Host
 from lxml import etree
+from pythonfmu import Boolean, Real, String
 
 import build
 from fmu_src.controller.lqr_controller import LqrController
-from fmu_src.quantities import TABLE, UNITS
+from fmu_src.quantities import PARAMETERS, TABLE, UNITS
 from fmu_src.road.road_excitation import RoadExcitation
 from fmu_src.slave import Slave
 from fmu_src.vehicle.vehicle7dof import Vehicle7DOF
@@ -49,9 +52,21 @@ def test_every_real_has_its_unit_its_limits_and_its_exact_start_value(dist: Path
     for name, real in reals:
         q = TABLE[name]
         low, high = float(real.get("min", -inf)), float(real.get("max", inf))
-        assert (low, high, float(real.get("nominal", 1.0))) == (0.0 if q.positive else q.low, q.high, q.nominal)
+        assert (low, high) == (0.0 if q.positive else q.low, q.high)
+        nominal = float(real.get("nominal", "nan"))
+        assert nominal == q.nominal and (not q.start or 0.1 <= abs(q.start) / nominal <= 10.0)
         if start := real.get("start"):
             assert start == repr(float(q.start))
+
+
+@every_model
+def test_limits_are_those_that_are_refused_beyond(dist: Path, model: str) -> None:
+    """What `min` cannot say, that it is itself refused, stands in the description."""
+    for v in description(dist, model).iter("ScalarVariable"):
+        if v[0].tag == "Real" and v.get("causality") == "parameter" and v[0].get("min"):
+            q, low = TABLE[str(v.get("name"))], float(v[0].get("min", "nan"))
+            assert q.fault(np.nextafter(low, -inf)) and not q.fault(np.nextafter(low, inf))
+            assert bool(q.fault(low)) == str(v.get("description")).endswith(", > 0")
 
 
 @every_model
@@ -128,3 +143,80 @@ def test_a_refusal_is_logged_in_the_category_that_it_declares_and_nothing_else_i
     first, *rest = done.stdout.splitlines()
     assert re.fullmatch(r"3 logStatusError Vehicle7DOF: initialization: m = -1\.0 kg: wanted .*", first)
     assert all("Fatal py exception" in line or "m = -1.0 kg" in line for line in rest)
+
+
+# ------------------------------------------------------------------ at the start
+Point = dict[str, Any]  # values of variables; "time": the start time
+NEAR = {"activation": "at t_on", "t_on": 0.25, "body.heave": 0.01, "body.pitch": 0.02, "der(body.roll)": 0.3}
+LOOSE: dict[str, list[Point]] = {  # points at which, together, everything that can act does
+    "RoadExcitation": [
+        {"time": 0.317, "profile": "sine"},
+        {"time": 0.317, "profile": "fourier", **{f"A_nu[{k}]": 0.001 * k for k in range(1, 9)}},
+    ],
+    "Vehicle7DOF": [{"bp1": 90.0, "bp2": 70.0, "m11": 28.0}],
+    "LqrController": [
+        {**NEAR, "time": 0.3, "T": 0.8},
+        {"time": 0.321, "body.heave": 0.01, "body.pitch": 0.02},  # control begins at 0.32 s
+        {**NEAR, "time": 0.3, "force_limit": 10.0},
+        {**NEAR, "time": 0.3, "horizon": "infinite", "design": "full-car"},
+        *(
+            {**NEAR, "time": 0.3, "actuators": "semi-active", "valve_damping": 50.0, "der(body.heave)": rate}
+            for rate in (-0.5, 0.5)
+        ),
+        {**NEAR, "time": 0.3, "sample_time": 0.01, "feedback": "estimate", "design": "full-car"},
+        {**NEAR, "time": 0.3, "actuator_lag": 0.01},
+    ],
+}
+STEP = {"v0": -4.0, "tau0": 0.013, "t_start": 0.017, "seed": 1.0, "Lambda": 1.0, "t_on": 0.1, "actuator_lag": 0.02}
+
+
+def started(model: str, point: Point) -> dict[str, float]:
+    """Outputs at the end of initialization, in a state of no symmetry but for what the point says."""
+    slave = SLAVES[model](instance_name="x", resources="")
+    references = {v.name: (r, type(v)) for r, v in slave.vars.items()}
+    generator = random.Random(5)
+    values = {q.name: 0.02 * generator.random() for q in (*slave.inputs, *slave.outputs[: slave.settable])} | point
+    slave.setup_experiment(values.pop("time", 0.0))
+    for name, value in values.items():
+        reference, kind = references[name]
+        {Real: slave.set_real, String: slave.set_string, Boolean: slave.set_boolean}[kind]([reference], [value])
+    slave.exit_initialization_mode()
+    return dict(zip((q.name for q in slave.outputs), slave.y, strict=True))
+
+
+def perturbed(model: str, point: Point, name: str) -> Point:
+    """The point with another value of one variable."""
+    choices = {c.name: c for c in SLAVES[model].choices}
+    if name in choices:
+        now: Any = point.get(name, choices[name].start)
+        changed: Any = [value for value in choices[name].values if value != now][-1]
+    elif name in SLAVES[model].switches:
+        changed = False
+    else:
+        q = TABLE[name]
+        now = point.get(name, q.start if name in PARAMETERS else None)
+        changed = 0.03 if now is None else now + STEP.get(name, 0.1 * q.nominal)
+    extra = {"m21": {"m22": changed}, "m22": {"m21": changed}}.get(name, {})  # the car takes no others
+    extra |= {"sample_time": 0.01} if changed == "estimate" else {}
+    return {**point, name: changed, **extra}
+
+
+@every_model
+def test_initial_unknowns_depend_on_what_the_structure_says_and_on_nothing_else(dist: Path, model: str) -> None:
+    """Each variable is changed at points where, together, everything acts; what cancels in equations is round-off."""
+    md = read_model_description(str(dist / f"{model}.fmu"))
+    declared = {u.variable.name: {v.name for v in u.dependencies} for u in md.initialUnknowns}
+    assert set(declared) == {q.name for q in SLAVES[model].outputs[SLAVES[model].settable :]}
+    causes = [v for v in md.modelVariables if v.initial == "exact" or v.causality in ("input", "parameter")]
+    open_ones = {name: set(names) for name, names in declared.items()}
+    for point in LOOSE[model]:
+        before = started(model, point)
+        for cause in (v.name for v in causes):
+            if point is not LOOSE[model][0] and not any(cause in names for names in open_ones.values()):
+                continue  # it has been seen to act wherever it is said to
+            after = started(model, perturbed(model, point, cause))
+            for name in declared:
+                if abs(after[name] - before[name]) > 1e-9 * max(abs(after[name]), abs(before[name]), 1e-6):
+                    assert cause in declared[name], (cause, name)
+                    open_ones[name].discard(cause)
+    assert {name: names for name, names in open_ones.items() if names} == {}

@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+import pythonfmu
 from conftest import ROOT
 from fmpy.cross_check.validate_vendor_repo import validate_test_fmu
 from lxml import etree
@@ -164,6 +165,46 @@ def test_texts_say_what_is_needed(dist: Path, model: str) -> None:
     assert ("control>=" in needs) == (model == "LqrController")
 
 
+WITHOUT_NUMPY = """
+import sys
+sys.modules.update(dict.fromkeys(("numpy", "scipy", "control")))
+from fmu_src.controller.lqr_controller import LqrController
+from fmu_src.quantities import PARAMETERS
+
+def needs(design, *changed, feedback="states"):
+    c = LqrController(instance_name="c", resources=sys.argv[1])
+    c.chosen[2], c.chosen[4] = design, feedback
+    for name in changed:
+        c.p[c.reals.index(name)] += 1.0 if name == "seed" else 1.0 + 0.01 * PARAMETERS[name].start
+    try:
+        c.exit_initialization_mode()
+    except RuntimeError as refusal:
+        assert "not installed" in str(refusal), refusal
+        return True
+    return False
+
+pairs = {"m21": ["m22"], "m22": ["m21"]}  # the car takes no others
+for design in ("half-car", "full-car"):
+    print(*(name for name in LqrController.reals if needs(design, name, *pairs.get(name, []))))
+print(needs("half-car", "sample_time", feedback="estimate"), needs("full-car", "sample_time", "force_limit"))
+"""
+
+
+def test_just_what_is_said_to_need_other_packages_needs_them(dist: Path, tmp_path: Path) -> None:
+    files = contents(dist, "LqrController")
+    said = " ".join(files["documentation/externalDependencies.txt"].decode().split())
+    for name in ("lqr_design.json", "lqr_design_full_car.json"):
+        (tmp_path / name).write_bytes(files[f"resources/{name}"])
+    command = [sys.executable, "-c", WITHOUT_NUMPY, str(tmp_path)]
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=120)
+    assert done.returncode == 0, done.stderr
+    half_car, full_car, rest = (line.split() for line in done.stdout.splitlines())
+    for design, needing in (("half-car", half_car), ("full-car", full_car)):
+        (listed,) = re.findall(f'design = "{design}" with another value of (.*?);', said)
+        assert sorted(listed.split(", ")) == sorted(needing)
+    assert rest == ["True", "False"] and 'feedback = "estimate"' in said
+
+
 def test_pythonfmu_deploy_installs_what_other_designs_need(dist: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     installed: list[str] = []
 
@@ -258,7 +299,7 @@ for model in build.MODELS:
 
 
 def test_another_folder_at_another_time_gives_the_same_bytes(dist: Path, tmp_path: Path) -> None:
-    """The sources copied elsewhere, built by a user with another home, style, time zone and language."""
+    """The sources copied elsewhere, built by a user with another home, style, time zone, language and processor."""
     copy, made = tmp_path / "else where" / "sources", tmp_path / "made"
     for folder in (copy, made):
         folder.mkdir(parents=True)
@@ -267,9 +308,35 @@ def test_another_folder_at_another_time_gives_the_same_bytes(dist: Path, tmp_pat
         shutil.copy(ROOT / name, copy)
     (copy / "matplotlibrc").write_text("font.size: 20\naxes.facecolor: black\nsavefig.dpi: 30\n")
     user = {"HOME": str(tmp_path), "TZ": "Pacific/Kiritimati", "LC_ALL": "C", "PYTHONHASHSEED": "7"}
+    user |= {"OPENBLAS_CORETYPE": "Nehalem"}  # rounds the products of matrices in another way
     command = [sys.executable, "-c", ELSEWHERE, str(made)]
     done = subprocess.run(command, cwd=copy, env={**os.environ, **user}, capture_output=True, text=True, timeout=300)
     assert done.returncode == 0, done.stdout + done.stderr
     for model in build.MODELS:
         assert contents(made, model) == contents(dist, model)  # says which entry differs, if one does
         assert (made / f"{model}.fmu").read_bytes() == (dist / f"{model}.fmu").read_bytes()
+
+
+def test_the_guid_is_that_of_all_that_acts(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A host may take what has the same guid for the same: our code, stored designs, PythonFMU with its libraries."""
+    package, library = tmp_path / "fmu_src", tmp_path / "pythonfmu"
+    shutil.copytree(build.PACKAGE, package, ignore=shutil.ignore_patterns("__pycache__"))
+    shutil.copytree(Path(pythonfmu.__file__).parent, library)
+    guids = {model: build._identity(model, package) for model in build.MODELS}
+    monkeypatch.setattr(pythonfmu, "__file__", str(library / "__init__.py"))
+
+    def changed() -> list[str]:
+        return [model for model, guid in guids.items() if build._identity(model, package) != guid]
+
+    assert changed() == []
+    design = package / build.DESIGNS / "lqr_design.json"
+    for path, models in (
+        (design, ["LqrController"]),
+        (package / "vehicle" / "equations.py", list(build.MODELS)),
+        (library / "resources" / "binaries" / "linux64" / "libpythonfmu-export.so", list(build.MODELS)),
+        (library / "fmi2slave.py", list(build.MODELS)),
+    ):
+        kept = path.read_bytes()
+        path.write_bytes(kept + b" ")
+        assert changed() == models, path
+        path.write_bytes(kept)

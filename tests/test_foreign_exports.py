@@ -22,6 +22,13 @@ def check(path: Path, *options: str) -> int:
     return main(["check", str(path), "--road-class", "exact", "--parameters", "bump", *options])
 
 
+def off(file: Path) -> float:
+    """Distance of a row from the proved tube, over what is allowed: the largest that was found."""
+    findings = json.loads(file.with_suffix(".findings.json").read_text())
+    (found,) = (f["measured"] for f in findings if f["claim"].startswith("no row is proved to be of another motion"))
+    return float(found)
+
+
 def fmpy(dist: Path, folder: Path, *start: object) -> Path:
     """fmpy's command line on the container."""
     step = ("--stop-time", STOP, "--output-interval", STEP, "--output-file", "fmpy.csv")
@@ -41,12 +48,15 @@ def test_fmpys_command_line(dist: Path, tmp_path: Path) -> None:
     path = fmpy(dist, tmp_path, "enabled", "false")
     assert main(["check", str(path), "--road-class", "curv:45"]) == 0
     assert check(path) == 0
+    assert off(path) == pytest.approx(0.33, rel=0.1)
     findings = json.loads((tmp_path / "fmpy.findings.json").read_text())
     assert findings and all(f["holds"] and "fmpy.csv, row" in f["source"] for f in findings[:-1])
 
 
 def test_fmpys_command_line_with_another_car(dist: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert check(fmpy(dist, tmp_path, "enabled", "false", "b1", "1212")) == 1
+    path = fmpy(dist, tmp_path, "enabled", "false", "b1", "1212")
+    assert check(path) == 1
+    assert off(path) == pytest.approx(3.2, rel=0.1)
     assert "fmpy.csv, row 107, column der(wheel_fl.heave), largest" in capsys.readouterr().out
 
 
@@ -62,6 +72,7 @@ def test_libcosims_log(system: Path, tmp_path: Path, capsys: pytest.CaptureFixtu
     """It has the heights that the car was given a step ago: no heights of its rows."""
     path = libcosim(with_parameters(system, tmp_path / "x.ssp", "x", PASSIVE), tmp_path)
     assert check(path) == 0
+    assert off(path) == pytest.approx(0.33, rel=0.1)
     assert main(["check", str(path), "--road-class", "curv:45"]) == 2
     assert "variable 'h_fl' is not in the trajectory" in capsys.readouterr().err
 
@@ -77,6 +88,7 @@ def test_ecos_csv(system: Path, tmp_path: Path, preload: str, capsys: pytest.Cap
     options = ("--path", "x.ssp", "--stopTime", STOP, "--stepSize", STEP, "--parameterSet", "x")
     ecos(tmp_path, preload, *options)
     assert check(tmp_path / "x.csv") == 0
+    assert off(tmp_path / "x.csv") == pytest.approx(0.32, rel=0.1)
     text = (tmp_path / "x.csv").read_text()
     (tmp_path / "x.csv").write_text(text.replace(", bump", ", sine"))
     assert check(tmp_path / "x.csv") == 2

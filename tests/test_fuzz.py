@@ -16,7 +16,21 @@ import build
 
 ANY = st.floats(allow_nan=True, allow_infinity=True) | st.sampled_from([0.0, 1e-3, 0.01, 1.0, 1e300, -1e300, 5e-324])
 STEPS = st.sampled_from([0.0, 1e-9, 1e-3, 1e-3, 1e-3, 0.01, 0.3, 5.0, 1e6, 1e300]) | ANY
-STRINGS = ["end", "start", "bump", "fourier", "infinite", "full-car", "semi-active", "estimate", "at t_on", "", "ψ"]
+STRINGS = [
+    "end",
+    "start",
+    "bump",
+    "fourier",
+    "infinite",
+    "full-car",
+    "semi-active",
+    "estimate",
+    "at t_on",
+    "",
+    "ψ",
+    "%s%n",
+]
+HARDWARE = ["sample_time", "actuator_lag", "force_limit", "valve_damping", "t_on", "T", "seed"]
 TIMES = st.sampled_from([0.0, 1e-3, 0.25, 100.0, -5.0]) | ANY
 
 
@@ -32,7 +46,7 @@ def unpacked(dist: Path, tmp_path_factory: pytest.TempPathFactory) -> None:
 class AnyCalls(RuleBasedStateMachine):
     """One instance of one of the FMUs, and states that it or an earlier moment of it gave."""
 
-    states: Bundle[bytes] = Bundle("states")
+    states: Bundle[tuple[bytes, bool]] = Bundle("states")
 
     @initialize(model=st.sampled_from(list(build.MODELS)), start=st.booleans())
     def instantiate(self, model: str, start: bool) -> None:
@@ -50,7 +64,8 @@ class AnyCalls(RuleBasedStateMachine):
     @rule(call=st.sampled_from(["EnterInitializationMode", "ExitInitializationMode", "Terminate", "Reset"]))
     def change_phase(self, call: str) -> None:
         done = self.host.status(call) == OK and not any("initialization:" in message for message in self.host.log)
-        self.initialized = done and (call == "ExitInitializationMode" or (self.initialized and call != "Reset"))
+        kept = self.initialized and call == "EnterInitializationMode"
+        self.initialized = done and (call == "ExitInitializationMode" or kept)  # after Terminate it echoes, too
 
     @rule(t=TIMES, h=STEPS)
     def step(self, t: float, h: float) -> None:
@@ -73,18 +88,30 @@ class AnyCalls(RuleBasedStateMachine):
     def set_a_boolean(self, reference: int, value: bool) -> None:
         self.host.set_boolean(reference, value)
 
+    @rule(name=st.sampled_from(HARDWARE), value=st.sampled_from([0.0, 0.003, 0.01, 50.0]))
+    def set_hardware(self, name: str, value: float) -> None:
+        if name in self.host.reference:
+            self.host.set({name: value})
+
+    @rule(reference=st.integers(0, 90), value=st.integers(-(2**31), 2**31 - 1))
+    def set_an_integer(self, reference: int, value: int) -> None:
+        self.host.tried("setInteger", [reference], [value])
+
     @rule(reference=st.integers(0, 90) | st.just(2**31))
     def get_anything(self, reference: int) -> None:
         self.host.real(reference)
+        for kind in ("Integer", "Boolean", "String"):
+            self.host.tried(f"get{kind}", [reference])
 
     @rule(target=states)
-    def get_state(self) -> bytes:
-        return self.host.to_bytes(self.host.state())
+    def get_state(self) -> tuple[bytes, bool]:
+        return self.host.to_bytes(self.host.state()), self.initialized
 
     @rule(state=states)
-    def set_state(self, state: bytes) -> None:
-        self.host.restore(self.host.from_bytes(state))
-        self.initialized = False  # the state may be of an earlier phase
+    def set_state(self, state: tuple[bytes, bool]) -> None:
+        data, initialized = state
+        if self.host.restore(self.host.from_bytes(data)) == OK:
+            self.initialized = initialized
 
     @invariant()
     def outputs_are_never_silently_not_finite(self) -> None:

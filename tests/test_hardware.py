@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 from conftest import ROOT
 from fmpy import extract
-from host import OK, Host
+from host import DISCARD, OK, Host
 from numpy.testing import assert_allclose
 from orders import observed_order
 
@@ -235,36 +235,85 @@ def test_in_the_loop_forces_keep_their_limit_and_valves_take_energy_out() -> Non
 
 # ------------------------------------------------------------------ state, refusals
 @pytest.fixture(scope="module")
-def loader(dist: Path, tmp_path_factory: pytest.TempPathFactory) -> Callable[[], Host]:
+def loader(dist: Path, tmp_path_factory: pytest.TempPathFactory) -> Callable[..., Host]:
     folder = Path(extract(dist / "LqrController.fmu", tmp_path_factory.mktemp("controller")))
 
-    def load() -> Host:
+    def load(parameters: dict[str, Any] = EVERYTHING) -> Host:
         host = Host(folder)
-        arrange(host)
+        give(host, parameters)
         return host
 
     return load
 
 
-def arrange(host: Host) -> None:
-    """All that a controller can have, at work from the start."""
-    for name, value in {**EVERYTHING, "activation": "at t_on", "t_on": 0.0}.items():
+def give(host: Host, parameters: dict[str, Any]) -> None:
+    """Hardware, at work from the start."""
+    for name, value in {**parameters, "activation": "at t_on", "t_on": 0.0}.items():
         given = host.set_string(host.reference[name], value) if isinstance(value, str) else host.set({name: value})
         assert given == OK
 
 
-def drive(host: Host, first: int, last: int) -> list[list[float]]:
-    """Steps of 3 ms, so that samples fall between; outputs are read twice, which must not matter."""
+def drive(host: Host, first: int, last: int, reads: int = 0, halts: int = 0) -> list[list[float]]:
+    """Steps of 3 ms, so that samples fall between; before each, outputs are read and steps of no length are made."""
     rows = []
     for k in range(first, last):
         assert host.set({name: 1e-3 * np.sin(k + i) for i, name in enumerate(host.inputs)}) == OK
-        host.get()
+        for _ in range(reads):
+            host.get()
+        for _ in range(halts):
+            assert host.step(k * 3e-3, 0.0) == OK
         assert host.step(k * 3e-3, 3e-3) == OK, host.log
         rows.append(host.get())
     return rows
 
 
-def test_the_whole_memory_travels_with_the_state_and_goes_with_reset(loader: Callable[[], Host]) -> None:
+HARDWARE: list[dict[str, Any]] = [
+    {},
+    {"force_limit": 60.0},
+    {"actuator_lag": 0.01},
+    {"sample_time": 0.005},
+    {"sample_time": 0.005, "actuator_lag": 0.01, "design": "full-car"},
+    {"sample_time": 0.005, "feedback": "estimate"},
+    {"actuators": "semi-active"},
+    EVERYTHING,
+]
+
+
+@pytest.mark.parametrize("parameters", HARDWARE)
+def test_neither_reading_nor_halting_changes_the_motion(
+    loader: Callable[..., Host], parameters: dict[str, Any]
+) -> None:
+    """A host may read outputs whenever it likes: what is looked at, and when, is for its steps to say."""
+    runs = []
+    for reads, halts in ((0, 0), (2, 0), (0, 2), (1, 1)):
+        host = loader(parameters)
+        assert host.start() == OK
+        runs.append(drive(host, 0, 40, reads, halts))
+        host.free()
+    assert np.abs(runs[0]).max() > 1.0
+    assert runs == [runs[0]] * 4
+
+
+@pytest.mark.parametrize("parameters", [p for p in HARDWARE if "force_limit" not in p])
+@pytest.mark.parametrize("read", [False, True])
+def test_inputs_that_ask_for_infinite_forces_can_be_repaired(
+    loader: Callable[..., Host], parameters: dict[str, Any], read: bool
+) -> None:
+    host, honest = loader(parameters), loader(parameters)
+    assert host.start() == honest.start() == OK
+    assert drive(host, 0, 15) == drive(honest, 0, 15)
+    for step in (6e-3, 0.0):  # a sample falls into the first
+        assert host.set(dict.fromkeys(host.inputs, 1e308)) == OK
+        if read:
+            assert np.isfinite(host.get()).all()
+        assert host.step(15 * 3e-3, step) == DISCARD or (step == 0.0 and host.get() == honest.get())
+        assert np.isfinite(host.get()).all()
+    assert drive(host, 15, 30) == drive(honest, 15, 30)
+    for each in (host, honest):
+        each.free()
+
+
+def test_the_whole_memory_travels_with_the_state_and_goes_with_reset(loader: Callable[..., Host]) -> None:
     host, fresh = loader(), loader()
     assert host.start() == fresh.start() == OK
     drive(host, 0, 25)
@@ -281,7 +330,7 @@ def test_the_whole_memory_travels_with_the_state_and_goes_with_reset(loader: Cal
     assert again.start() == OK
     beginning = drive(again, 0, 25)
     assert fresh.status("Reset") == OK
-    arrange(fresh)
+    give(fresh, EVERYTHING)
     assert fresh.start() == OK
     assert drive(fresh, 0, 25) == beginning
     for each in (host, fresh, again):
@@ -315,6 +364,7 @@ def test_a_filter_that_needs_missing_packages_says_what_to_install_and_stored_de
         "    c.chosen[:] = ['finite', 'at t_on', 'full-car', 'semi-active', feedback]\n"
         "    c.p[c.reals.index('sample_time')] = 0.01\n"
         "    c.p[c.reals.index('actuator_lag')] = 0.01\n"
+        "    c.setup_experiment(0.3)\n"
         "    try:\n        c.exit_initialization_mode()\n        c.u[:] = [0.01] * 14\n"
         "        print(c.do_step(0.3, 0.1), c.do_step(0.4, 0.1), any(c.y))\n"
         "    except RuntimeError as refusal: print(refusal)\n"

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import shutil
+import subprocess
+import sys
 import tempfile
 import zipfile
 from collections.abc import Callable
@@ -11,6 +13,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from conftest import ROOT
 
 from analysis.cosimulation import simulate
 from analysis.errors import InputError
@@ -110,6 +113,22 @@ def test_a_component_may_have_any_name(system: Path, unpacked: Path) -> None:
     structure.write_text(text, encoding="utf-8")
     named, plain = simulate(SHORT, unpacked), simulate(SHORT, system)
     np.testing.assert_array_equal(named.trajectory.values, plain.trajectory.values)
+
+
+def test_a_component_of_any_name_may_be_refused(unpacked: Path) -> None:
+    """Its name is in the message, which FMI takes for a format of printf."""
+    structure = unpacked / "SystemStructure.ssd"
+    text = structure.read_text(encoding="utf-8").replace('"vehicle"', '"car 100%s%n"')
+    structure.write_text(text, encoding="utf-8")
+    code = (
+        "import sys; from pathlib import Path\n"
+        "from analysis.cosimulation import simulate\nfrom analysis.scenario import Scenario\n"
+        "try: simulate(Scenario(name='x', stop_time=0.01, parameters={'m21': 21.0}), Path(sys.argv[1]))\n"
+        "except Exception as error: print(error, flush=True)\n"
+    )
+    done = subprocess.run([sys.executable, "-c", code, unpacked], cwd=ROOT, capture_output=True, text=True, timeout=60)
+    assert done.returncode == 0, done.stderr
+    assert "it said: car 100%s%n: initialization: m21 = 21.0 kg, m22 = 22.0 kg: wanted equal masses" in done.stdout
 
 
 @pytest.mark.parametrize("name", ["a#1", "50%", "Jürgen", "it's"])

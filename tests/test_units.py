@@ -6,6 +6,7 @@ import math
 import re
 import shutil
 import zipfile
+from copy import deepcopy
 from pathlib import Path
 from typing import Any
 
@@ -169,8 +170,8 @@ def test_the_shipped_system_is_wired_without_any_conversion(dist: Path) -> None:
     for name, source in wiring.sources.items():
         variables = read_model_description(str(dist / Path(source).name)).modelVariables
         fmus |= {Port(name, v.name): unit_of(v.unit) for v in variables if v.type == "Real"}
-    assert set(conversions(wiring, fmus).values()) == {SAME}
-    assert set(conversions(wiring, {}).values()) == {SAME}
+    assert set(conversions(wiring, fmus)[0].values()) == {SAME}
+    assert set(conversions(wiring, {})[0].values()) == {SAME}
 
 
 def unit_of(name: str) -> Unit:
@@ -185,7 +186,10 @@ def wired(folder: Path, *changes: tuple[str, str]) -> dict[Port, Conversion]:
         assert old in text
         text = text.replace(old, new)
     (folder / "system.ssd").write_text(text, encoding="utf-8")
-    return conversions(read_wiring(folder / "system.ssd"), {})
+    found, faults = conversions(read_wiring(folder / "system.ssd"), {})
+    if faults:
+        raise InputError("\n".join(faults))
+    return found
 
 
 HEIGHT = '<ssd:Connector name="h_fl" kind="output"><ssc:Real unit="{}"/>'.format
@@ -252,3 +256,34 @@ def test_all_connections_that_cannot_be_converted_are_named_fmus_included(dist: 
     for corner in CORNERS:
         at = rf".*other\.ssp/SystemStructure\.ssd:\d+: wanted (road|vehicle)\.dh_{corner} at its connector in a unit"
         assert len([line for line in lines if re.match(at, line)]) == 2
+
+
+def test_faults_of_all_kinds_are_named_at_once(dist: Path, tmp_path: Path) -> None:
+    """In the structure alone, between it and its FMUs, in a file, in units: who mends one wants to know the rest."""
+
+    def edit(root: etree._Element) -> None:
+        put_units(root, "road", {"m/s": "kg"})  # four rates, at their connectors and at those of the car
+        (connections,) = root.iterfind(".//ssd:Connections", NS)
+        twice = next(c for c in connections if c.get("endConnector") == "force_rl")
+        again = deepcopy(twice)
+        again.set("startConnector", "force_rr")
+        connections.append(again)
+        (connector,) = root.iterfind(".//ssd:Component[@name='road']//ssd:Connector[@name='bow_fl']", NS)
+        wire = next(c for c in connections if c.get("startConnector") == "bow_fl")
+        connector.set("name", "bow_xx")
+        wire.set("startConnector", "bow_xx")
+        (controller,) = root.iterfind(".//ssd:Component[@name='controller']", NS)
+        controller.set("source", "resources/Nothing.fmu")
+
+    other = variant(dist / "VehicleOnRoad.ssp", tmp_path / "other.ssp", edit)
+    with pytest.raises(InputError) as refusal:
+        simulate(Scenario(name="x", stop_time=0.1), other)
+    lines = str(refusal.value).split("\n")
+    kinds = [
+        r".*:\d+: vehicle\.force_rl has two sources",
+        r"controller: Nothing\.fmu cannot be read as an FMU: .*",
+        r".*: its FMUs lack these of its connectors: road\.bow_xx \(output\)",
+        *[r".*:\d+: wanted .* in a unit that can be made of .*"] * 8,
+    ]
+    assert len(lines) == len(kinds)
+    assert all(re.fullmatch(kind, line) for kind, line in zip(kinds, lines, strict=True)), lines

@@ -1,7 +1,7 @@
 """A controller design as data: gains of u = K x for the infinite horizon and, by time to go, for the finite one.
 
-The designs for the default parameters are made when the FMU is built and stored in its resources; reading one and
-looking up a gain take the standard library alone.
+The designs for the default parameters lie in `designs`, and in the FMU's resources; reading one and looking up a gain
+take the standard library alone.
 """
 
 from __future__ import annotations

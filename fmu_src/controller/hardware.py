@@ -1,11 +1,13 @@
 """What a real car puts between the law and the struts: samples, sensors, limits, lag, valves. All of it off by default.
 
-A sample is taken at the first communication point at or after each multiple of the sample time (at every communication
-point without one) and its forces are held until the next. Per sample: sensors and filter, if there are any, make the
-states that the law sees; the forces are cut to the limit. The actuators follow with a lag; those that are semi-active
-are dampers with a valve: they give a force only while it takes energy out of the strut, u Δ̇ ≤ 0, and no more of it than
-with the valve shut, |u| ≤ b_max |Δ̇|. (Without that bound the force would hold a strut still as dry friction does.) That
-is so at communication points: under a force that a master holds over its step a strut may turn, and gets a little.
+A sample is taken at the first communication point at or after each multiple of the sample time (at every
+communication point without one) and its forces are held until the next. It is taken when the step to that point is
+made, of the inputs that the host set before this step (for the first, before the end of initialization); reading
+outputs, or a step of no length, takes none. Per sample: sensors and filter, if there are any, make the states that
+the law sees; the forces are cut to the limit. The actuators follow with a lag; those that are semi-active are dampers
+with a valve: they give a force only while it takes energy out of the strut, u Δ̇ ≤ 0, and no more of it than with the
+valve shut, |u| ≤ b_max |Δ̇|. (Without that bound the force would hold a strut still as dry friction does.) That is so
+at communication points: under a force that a master holds over its step a strut may turn, and gets a little.
 """
 
 from __future__ import annotations

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from math import isfinite
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -29,7 +30,7 @@ class LqrController(Slave):
     _control = ControlParameters()
     _design: Design | None = None
     _loop: Loop | None = None  # None: ideal actuators and full knowledge of the states
-    _before, _after = Memory(), Memory()  # the present look at the inputs
+    _memory = Memory()  # after the look at the inputs that was taken when the present time was reached
 
     def configure(self) -> None:
         choices = {choice.name: value for choice, value in zip(self.choices, self.chosen, strict=True)}
@@ -45,7 +46,7 @@ class LqrController(Slave):
                 raise _lacking("feedback = 'estimate' needs a filter, whose computation", missing) from missing
 
     def _designed(self, p: ControlParameters) -> Design:
-        """The design for these parameters: the one at hand, the one that was stored at build time, or a new one."""
+        """The design for these parameters: the one at hand, the one that is stored in the resources, or a new one."""
         span = p.end - p.begin
         at_hand = stored(Path(self.resources) / FILE_NAMES[type(p.model)]) if self.resources else None
         for known in (self._design, at_hand):
@@ -60,30 +61,45 @@ class LqrController(Slave):
             ) from missing
 
     def begin(self) -> None:
-        self._before = Memory()
+        self._memory = self._looked(self.time, Memory())
 
     def memory(self) -> list[Any]:
-        return [self._design, self._before, self._after]
+        return [self._design, self._memory]
 
     def recall(self, memory: list[Any]) -> None:
-        design, before, after = memory
+        design, remembered = memory
         self._design = Design.of(design) if isinstance(design, dict) else design
-        self._before, self._after = _memory(before), _memory(after)
+        self._memory = _memory(remembered)
 
     def advance(self, t: float, step: float) -> None:
         if fault := self._control.fault_of_step(t, step):
             raise StepError(fault)
-        self.time = t + step
         if self._loop:
-            self._before = self._loop.elapsed(step, self._after)
+            self._memory = self._looked(t + step, self._loop.elapsed(step, self._memory))
+        self.time = t + step
         self.feed_through()
 
     def feed_through(self) -> None:
+        """The forces for the present inputs. Nothing is remembered, or reading outputs would change the motion."""
         if self._loop:
-            self._after = self._loop.sampled(self.time, self.u, self._before)
-            self.y[:] = self._loop.forces(self.u, self._after)
+            self.y[:] = self._loop.forces(self.u, self._loop.sampled(self.time, self.u, self._memory))
         else:
             self.y[:] = self._law(self.time, self.u)
+
+    def _looked(self, t: float, before: Memory) -> Memory:
+        """The memory after a look at the inputs; raises StepError where it would leave the finite numbers."""
+        if self._loop is None:
+            return before
+        after = self._loop.sampled(t, self.u, before)
+        lost = [f"{q.name} = {x!r} {q.unit}" for q, x in zip(FORCES, after.command, strict=True) if not isfinite(x)]
+        lost += [
+            f"estimated {q.name} = {x!r} {q.unit}"
+            for q, x in zip(STATES, after.estimate, strict=True)
+            if not isfinite(x)
+        ]
+        if lost:
+            raise StepError(f"the law asks for what is not finite: {', '.join(lost)}")
+        return after
 
 
 def _memory(data: list[Any]) -> Memory:

@@ -21,6 +21,8 @@ from fmpy.container_fmu.config import Component, Configuration, Connection
 from fmpy.model_description import CoSimulation, DefaultExperiment, ModelDescription, ModelVariable, Unknown
 from fmpy.ssp.ssd import SystemStructureDescription, read_ssd
 
+from .contents import container_documents
+
 Mapping = dict[ModelVariable, list[tuple[Component, ModelVariable]]]
 
 
@@ -47,7 +49,8 @@ def container_contents(system: Path, step: float = 1e-3, stop: float = 5.0) -> d
         with zipfile.ZipFile(made) as archive:
             unwanted = ("Container.zip", "binaries/darwin64/")
             names = [n for n in archive.namelist() if not n.endswith("/") and not n.startswith(unwanted)]
-            return {name: archive.read(name) for name in names}
+            files_inside = {name: archive.read(name) for name in names}
+        return {**files_inside, **container_documents(files_inside, step)}
 
 
 def _connections(ssd: SystemStructureDescription, components: dict[str, Component]) -> list[Connection]:
@@ -103,7 +106,7 @@ def _description(
         modelVariables=[time, *variables],
     )
     made.coSimulation = CoSimulation(
-        modelIdentifier="container_fmu", fixedInternalStepSize=step, canHandleVariableCommunicationStepSize=True
+        modelIdentifier="container_fmu", fixedInternalStepSize=step, canHandleVariableCommunicationStepSize=False
     )
     known = [v for v in variables if v.initial == "exact" and v.causality == "output"]
     made.outputs = [Unknown(variable=v, dependencies=[]) for v in variables if v.causality == "output"]

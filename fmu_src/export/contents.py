@@ -7,10 +7,12 @@ from collections.abc import Callable
 from importlib.metadata import distribution
 from pathlib import Path
 from typing import Any
+from xml.etree.ElementTree import fromstring
 
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
-from . import controller_drawing, drawing, reference, road_drawing, vehicle_drawing
+from ..controller.law import CAR, HALF_CAR, WEIGHTS
+from . import controller_drawing, drawing, reference, road_drawing, system_drawing, vehicle_drawing
 from .formulas import with_formulas
 from .reader import Description, describe
 
@@ -30,6 +32,13 @@ They hold CPPFMU, Copyright 2016-2019, SINTEF Ocean, under the Mozilla Public Li
 its source, in which nothing is changed, is part of PythonFMU's: github.com/NTNU-IHB/PythonFMU,
 pythonfmu/pythonfmu-export.
 """
+CONTAINER = """
+
+----------------------------------------------------------------------------------------------------
+The libraries in binaries/ are fmpy's container_fmu. They are written in Rust and hold its standard library and the
+crates serde, serde_json, url, idna, percent-encoding, smallvec (each MIT or Apache-2.0), icu (Unicode-3.0) and fmi-rs;
+their texts are at crates.io.
+"""
 
 
 def extra_entries(fmu: Path) -> dict[str, bytes]:
@@ -41,7 +50,13 @@ def extra_entries(fmu: Path) -> dict[str, bytes]:
     entries = {
         "model.png": picture,
         "documentation/index.html": _page(description, picture),
-        "documentation/externalDependencies.txt": _render("externalDependencies.txt", description, requirements=needed),
+        "documentation/externalDependencies.txt": _render(
+            "externalDependencies.txt",
+            description,
+            requirements=needed,
+            half_car=HALF_CAR,
+            full_car=dict.fromkeys([*CAR, *WEIGHTS]),
+        ),
         "documentation/fmi-ls-ref.txt": _render(
             "fmi-ls-ref.txt",
             description,
@@ -60,6 +75,25 @@ def extra_entries(fmu: Path) -> dict[str, bytes]:
     return entries
 
 
+def container_documents(files: dict[str, bytes], step: float) -> dict[str, bytes]:
+    """Picture, page and licences of the container FMU that holds these files and makes steps of this length [s]."""
+    description = Description(fromstring(files["modelDescription.xml"]))
+    picture = drawing.png(system_drawing.draw)
+    components = sorted({name.split("/")[1] for name in files if name.count("/") > 1 and name.startswith("resources/")})
+    values = {"variables": description.variables, "picture": base64.b64encode(picture).decode()}
+    needs = files["resources/LqrController/documentation/externalDependencies.txt"]  # the one that needs most
+    return {
+        "model.png": picture,
+        "documentation/index.html": _render(
+            "VehicleOnRoad.html", description, components=components, step=step, **values
+        ),
+        "documentation/externalDependencies.txt": needs,
+        "documentation/licenses/license.txt": LICENSE.read_text(encoding="utf-8").encode(),
+        "documentation/licenses/pythonfmu.txt": _license_of_pythonfmu(),
+        "documentation/licenses/fmpy.txt": (_license_of("fmpy") + CONTAINER).encode(),
+    }
+
+
 def requirements() -> list[str]:
     """What `pythonfmu deploy` installs for designs with other than default parameters, as this project asks for it."""
     wanted = distribution("bertolino-baksa").requires or []
@@ -70,11 +104,16 @@ def requirements() -> list[str]:
 
 
 def _license_of_pythonfmu() -> bytes:
-    installed = distribution("pythonfmu")
-    text = next((found for name in ("licenses/LICENSE", "LICENSE") if (found := installed.read_text(name))), None)
+    return (_license_of("pythonfmu") + NOTICE).encode()
+
+
+def _license_of(package: str) -> str:
+    installed = distribution(package)
+    names = ("licenses/LICENSE", "LICENSE", "licenses/LICENSE.txt", "LICENSE.txt")
+    text = next((found for name in names if (found := installed.read_text(name))), None)
     if text is None:
-        raise LookupError("no licence is installed with pythonfmu, whose code goes into the FMU")
-    return (text.rstrip() + NOTICE).encode()
+        raise LookupError(f"no licence is installed with {package}, whose code goes into the FMU")
+    return text.rstrip()
 
 
 # ------------------------------------------------------------------ pages

@@ -56,7 +56,7 @@ def describe(fmu: Path) -> Description:
 def _variable(variable: Element) -> Variable:
     """The row of a ScalarVariable; symbol and words without it come from the table of quantities, where it has it."""
     name, kind = variable.attrib["name"], variable[0]
-    known = TABLE.get(name)
+    known = TABLE.get(name) or TABLE.get(name.partition(".")[2])  # in a container the component's name comes first
     return Variable(
         name=name,
         symbol=known.symbol if known else "",

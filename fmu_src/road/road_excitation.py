@@ -8,6 +8,16 @@ from ..quantities import CORNER_WORDS, CORNERS, ROAD
 from ..slave import Slave
 from .profiles import HARMONICS, PROFILE, RoadParameters, road
 
+DELAYS = dict(zip(CORNERS, ((), ("tau0",), ("a", "b"), ("a", "b", "tau0")), strict=True))
+INITIALLY = {
+    **{
+        f"{kind}_{corner}": ("profile", "A", "Lambda", "v0", "t_start", *delay, *HARMONICS, f"excite_{corner}")
+        for kind in ("h", "dh")
+        for corner, delay in DELAYS.items()
+    },
+    **{f"bow_{corner}": () for corner in CORNERS},  # there is no step yet
+}
+
 
 class RoadExcitation(Slave):
     """Heights, rates and bows under the wheels at the present time; a function of time alone."""
@@ -21,6 +31,8 @@ class RoadExcitation(Slave):
         for corner, words in zip(CORNERS, CORNER_WORDS, strict=True)
     }
 
+    initially: ClassVar[dict[str, tuple[str, ...]]] = INITIALLY
+
     def configure(self) -> None:
         p = self.parameters()
         amplitudes = tuple(p.pop(name) for name in HARMONICS)
@@ -31,10 +43,12 @@ class RoadExcitation(Slave):
     def begin(self) -> None:
         self.y[:] = (*self._road.heights(self.time), *self._road.rates(self.time), 0.0, 0.0, 0.0, 0.0)
 
+    def jump(self, t: float) -> None:
+        """The road is a function of time alone: it follows."""
+        self.time = t
+        self.begin()
+
     def advance(self, t: float, step: float) -> None:
-        if t != self.time:  # the host has jumped
-            self.time = t
-            self.begin()
         if t >= self._end:
             self.y[8:] = (0.0, 0.0, 0.0, 0.0)
             return

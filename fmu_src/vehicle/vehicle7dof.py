@@ -9,7 +9,6 @@ from typing import Any, ClassVar
 from ..integrate import RoadWithin, Vector, cubic_road, rk4, straight_road
 from ..quantities import (
     ACCELERATIONS,
-    CORNERS,
     FORCES,
     ROAD,
     STATES,
@@ -20,6 +19,7 @@ from ..quantities import (
 from ..slave import Slave, StepError
 from .equations import equations_of_motion
 from .parameters import Car
+from .structure import FEED_THROUGH, INITIALLY
 
 CAR = tuple(f.name for f in fields(Car))
 SAMPLING = Choice(
@@ -27,18 +27,6 @@ SAMPLING = Choice(
     values=("start", "end"),
     text="road inputs are values at the start of a step, carried on by their rates, or at its end (road stepped first)",
 )
-
-
-def _at(corners: tuple[str, ...], *kinds: str) -> tuple[str, ...]:
-    return tuple(f"{kind}_{corner}" for kind in kinds for corner in corners)
-
-
-FEED_THROUGH = {  # of (3.1)–(3.7): the struts stand between the body and the road
-    **{f"body.{motion}_acceleration": _at(CORNERS, "force") for motion in ("heave", "roll", "pitch")},
-    **{f"wheel_{corner}.heave_acceleration": _at((corner,), "force", "h", "dh") for corner in CORNERS[:2]},
-    **{f"axle_r.{motion}_acceleration": _at(CORNERS[2:], "force", "h", "dh") for motion in ("heave", "roll")},
-    **{f"tyre_{corner}.force": _at((corner,), "h", "dh") for corner in CORNERS},
-}
 MOST_PARTS = 200_000  # internal steps of a communication step: more would look like a hang
 
 
@@ -52,6 +40,7 @@ class Vehicle7DOF(Slave):
     reals = (*CAR, "h_max")
     choices = (SAMPLING,)
     dependencies: ClassVar[dict[str, tuple[str, ...]]] = FEED_THROUGH
+    initially: ClassVar[dict[str, tuple[str, ...]]] = INITIALLY
 
     def configure(self) -> None:
         p = self.parameters()
