@@ -194,7 +194,7 @@ def renew_designs() -> None:
 
 
 def _identity(model: str, package: Path) -> str:
-    """Hash of all that acts in an FMU: our code, designs, slave script, PythonFMU, and what is changed in its library."""
+    """Hash of all that acts in an FMU: our code and designs, the slave script, PythonFMU and how it is changed."""
     import pythonfmu
 
     parts = [model, ENTRY, _content_hash([package], LEFT_OUT), _content_hash([*_designs(model, package), CURE])]
