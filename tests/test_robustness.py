@@ -15,7 +15,15 @@ from numpy.testing import assert_allclose
 from analysis.car import car_form
 from analysis.stabilization import certified, study
 from analysis.stabilization.certified import _is_positive, around, certify, closed_loop, growth
-from analysis.stabilization.full_car import VARIED, car_plant, full_gain, half_car_plant, strut_gain, varied_values
+from analysis.stabilization.full_car import (
+    AXLES,
+    VARIED,
+    car_plant,
+    full_gain,
+    half_car_plant,
+    strut_gain,
+    varied_values,
+)
 from analysis.stabilization.half_car import corrected
 from analysis.stabilization.margins import Margins, loop_margins, margins
 from analysis.stabilization.regulator import Regulator, stationary
@@ -45,7 +53,7 @@ def sharp() -> tuple[Array, Array, Array]:
 
 @pytest.fixture(scope="module")
 def sharp_margins(sharp: tuple[Array, Array, Array]) -> Margins:
-    return margins(*sharp)
+    return margins(*sharp, AXLES)
 
 
 # ------------------------------------------------------------------ closed forms
@@ -71,6 +79,28 @@ def test_margins_of_three_lags() -> None:
     assert found.loops[0].up == pytest.approx(8 / k, rel=1e-6)
     assert found.loops[0].phase == pytest.approx(np.degrees(left), rel=1e-6)
     assert found.delay == pytest.approx(left / omega, rel=1e-9)
+
+
+@pytest.mark.parametrize("k", [3.0, 1.5])
+def test_margins_of_an_unstable_plant_have_a_least_gain(k: float) -> None:
+    """L = k/(s − 1) needs a gain over 1/k, met at rest; |L| = 1 at ω = √(k² − 1), where atan ω is left of its phase."""
+    found = margins(np.eye(1), np.eye(1), np.array([[-k]]))
+    for loop in (*found.loops, found.common):
+        assert loop.down == pytest.approx(1 / k, rel=1e-9)
+        assert loop.up == np.inf
+        assert loop.phase == pytest.approx(np.degrees(np.arctan(np.sqrt(k**2 - 1))), rel=1e-9)
+
+
+def test_a_lead_of_the_phase_counts_as_a_lag_does() -> None:
+    """L = −k/(s² + 2ζs + 1), k < 1: below the resonance, where |L| = 1, a small lead is what takes it to the verge."""
+    k, zeta = 0.8, 0.02
+    found = margins(np.array([[0.0, 1.0], [-1.0, -2 * zeta]]), np.array([[0.0], [1.0]]), np.array([[k, 0.0]]))
+    square = min(np.roots([1.0, 4 * zeta**2 - 2.0, 1.0 - k**2]).real)  # ω² with |1 − ω² + 2iζω| = k
+    lead = np.degrees(np.arctan2(2 * zeta * np.sqrt(square), 1.0 - square))
+    assert lead < 2.0
+    for loop in (*found.loops, found.common):
+        assert loop.phase == pytest.approx(lead, rel=1e-6)
+        assert loop.up == pytest.approx(1 / k, rel=1e-9)  # at rest
 
 
 # ------------------------------------------------------------------ what theory promises
@@ -109,17 +139,37 @@ def test_at_a_margin_the_closed_loop_has_an_undamped_oscillation(
     sharp: tuple[Array, Array, Array], sharp_margins: Margins
 ) -> None:
     A, B, K = sharp
-    for i, loop in enumerate(sharp_margins.loops):
-        for name, factor in (("gain", loop.up), ("phase", np.exp(-1j * np.radians(loop.phase)))):
+    every = list(range(4))
+    for wrong, loop in zip([*AXLES, every], [*sharp_margins.loops, sharp_margins.common], strict=True):
+
+        def growths(factor: complex, wrong: Any = wrong) -> Array:
             changed = np.ones(4, complex)
-            changed[i] = factor
-            poles = np.linalg.eigvals(A + B @ (changed[:, None] * K))
-            assert np.abs(poles.real).min() < 1e-5 * np.abs(poles).max(), name
-    just = [
-        np.linalg.eigvals(A + B @ (np.where(np.arange(4) == 2, g, 1.0)[:, None] * K)).real.max() for g in (6.5, 6.7)
+            changed[list(wrong)] = factor
+            return np.linalg.eigvals(A + B @ (changed[:, None] * K)).real
+
+        turn = 1j * np.radians(loop.phase)
+        for verge in (loop.up, max(np.exp(-turn), np.exp(turn), key=lambda factor: growths(factor).max())):
+            assert abs(growths(verge).max()) < 1e-4  # of poles of up to 100 1/s
+            assert growths(verge**0.99).max() < 0.0 < growths(verge**1.01).max()
+            nearer = [verge**share for share in np.linspace(0.0, 0.99, 30)]
+            assert all(growths(factor).max() < 0.0 for factor in nearer)
+    assert sharp_margins.common.up == pytest.approx(3.80, abs=0.005)
+    assert sharp_margins.common.phase == pytest.approx(30.0, abs=0.05)
+
+
+def test_the_common_phase_of_a_full_car_design_is_where_eigenvalues_have_it_and_less_than_each_struts(
+    sharp: tuple[Array, Array, Array],
+) -> None:
+    A, B, _ = sharp
+    K = full_gain(FullCar(lam=SHARP))
+    found = margins(A, B, K)
+    rates = [
+        np.linalg.eigvals(A + np.exp(-1j * np.radians(f * found.common.phase)) * B @ K).real.max() for f in (0.99, 1.01)
     ]
-    assert just[0] < 0.0 < just[1]
-    assert 6.5 < sharp_margins.loops[2].up < 6.7
+    assert rates[0] < 0.0 < rates[1]
+    assert found.common.phase < 0.8 * min(loop.phase for loop in found.loops)
+    assert found.common.up == np.inf
+    assert np.linalg.eigvals(A + 1e5 * B @ K).real.max() < 0.0
 
 
 def rightmost(A: Array, BK: Array, delay: float, points: int = 20) -> float:
@@ -176,7 +226,7 @@ def test_the_disk_margin_of_one_loop_is_that_of_python_control() -> None:
     A, B, K = np.eye(3, k=1) - np.eye(3), np.array([[0.0], [0.0], [1.0]]), np.array([[-4.0, 0.0, 0.0]])
     alpha, _, _ = control.disk_margins(control.ss(A, B, -K, 0.0), np.linspace(1.2, 2.2, 4001))
     assert margins(A, B, K).disk == pytest.approx(alpha, rel=1e-6)
-    assert loop_margins(A, B, K, 0).up == pytest.approx(2.0, rel=1e-6)
+    assert loop_margins(A, B, K, [0]).up == pytest.approx(2.0, rel=1e-6)
 
 
 # ------------------------------------------------------------------ the car

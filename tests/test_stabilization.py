@@ -35,6 +35,7 @@ from analysis.stabilization.half_car import (
     printed_control,
 )
 from analysis.stabilization.limit import approach
+from analysis.stabilization.margins import LoopMargins, Margins
 from analysis.stabilization.pontryagin import by_collocation, by_exponentials, hamiltonian
 from analysis.stabilization.regulator import (
     Arc,
@@ -285,6 +286,8 @@ def test_the_command_writes_table_json_and_figures(
     assert proved == [[1.0, 0.0], [1.0, 1.0]]
     own = [growth(car_plant(Car()), full_gain(FullCar(lam=w["lambda"])), varied_values(Car())) for w in data["weights"]]
     assert [w["full-car design, car"]["growth"] for w in data["weights"]] == pytest.approx(own)
+    broken = [data["weights"][0][f"{d}-car design, car"]["margins"]["loops"] for d in ("half", "full")]
+    assert [len(loops) for loops in broken] == [2, 4]  # what one signal commands: axles, struts
     figures = sorted(path.name for path in tmp_path.glob("*.svg"))
     assert figures == [f"stabilization-{n}.svg" for n in ("08-L14", "09-motion", "10-forces", "limit", "printed")]
     page = (tmp_path / document.PAGE).read_text(encoding="utf-8")
@@ -294,6 +297,14 @@ def test_the_command_writes_table_json_and_figures(
     assert "λ = 1e+10 N²/m², H1 = 1 m, T = 2.3 s are this project's choice" in page
     with pytest.raises(InputError, match="wanted a folder, got a file"):
         document.run(tmp_path / document.FILE)
+
+
+def test_margins_are_printed_as_the_worst_of_one_signal_and_as_those_of_all() -> None:
+    loops = (LoopMargins(down=0.1, up=5.0, phase=40.0), LoopMargins(down=0.2, up=3.0, phase=np.inf))
+    made = Margins(loops=loops, common=LoopMargins(0.25, 2.5, 30.0), return_difference=0.61, disk=0.72, delay=0.0115)
+    assert document._margin_cells(made) == ("0.2 to 3", "40°", "0.25 to 2.5", "30°", "0.61", "0.72", "11.5 ms")
+    never = replace(made, loops=loops[1:], delay=np.inf)
+    assert document._margin_cells(never)[1] == document._margin_cells(never)[-1] == "any"
 
 
 # ------------------------------------------------------------------ the FMU in the loop

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -16,14 +16,21 @@ from ..files import write_whole
 from ..findings import Finding
 from .certified import Certified
 from .drawings import CHOICE, subjects
-from .margins import Margins
+from .margins import LoopMargins, Margins
 from .study import SPREAD, Robustness, Solution, Study, Weighted, study
 
 FILE, PAGE = "stabilization.json", "stabilization.md"
-ROBUST = ("λ", "design", "plant", "growth", "worst", "gain ×", "phase", "σ(I + L)", "disk", "delay", "proved stable")
+ROBUST = (
+    "λ", "design", "plant", "growth", "worst", "one: gain ×", "one: phase", "all: gain ×", "all: phase", "σ(I + L)",
+    "disk", "all: delay", "proved stable",
+)  # fmt: skip
 WEAKEST = (
     "weakest mode: least |wᴴB| / |w||B| over the left eigenvectors w of A, in SI units; 0 would be: not controllable. "
     "J and forces are from x(t_B2) of each one's own motion over the bump."
+)
+BROKEN = (
+    "one: what the weakest signal stands while the others are as they are, an axle's (both its struts together) in the "
+    "half-car design, a strut's in the full-car design; all: what all stand together if they are wrong by the same."
 )
 DEFAULT = f"{CHOICE} are this project's choice: the paper gives none."
 
@@ -147,9 +154,13 @@ def _robustness_json(r: Robustness) -> dict[str, Any]:
 def _margins_json(m: Margins | None) -> dict[str, Any] | None:
     if m is None:
         return None
-    loops = [{key: _finite(value) for key, value in asdict(loop).items()} for loop in m.loops]
+
+    def loop_json(loop: LoopMargins) -> dict[str, Any]:
+        return {key: _finite(value) for key, value in asdict(loop).items()}
+
     return {
-        "loops": loops,
+        "loops": [loop_json(loop) for loop in m.loops],
+        "common": loop_json(m.common),
         "return difference": m.return_difference,
         "disk": m.disk,
         "delay": _finite(m.delay),
@@ -186,7 +197,7 @@ def text(result: Study) -> str:
             f"u = K x broken at the actuators; body's mass with its inertias, c1, c2 ± {SPREAD:.0%}:\n" + _table(
                 ROBUST,
                 [row for w in result.weighted for row in _robust_rows(w)],
-            ),
+            ) + "\n" + BROKEN,
             _lost(result.lost),
         ]
     )  # fmt: skip
@@ -232,20 +243,22 @@ def _robust_cells(r: Robustness) -> tuple[str, ...]:
 
 def _margin_cells(m: Margins | None) -> tuple[str, ...]:
     if m is None:
-        return ("—",) * 5
-
-    def least(value: float, write: Callable[[float], str]) -> str:
-        return write(value) if np.isfinite(value) else "any"
-
-    up, phase = min(loop.up for loop in m.loops), min(loop.phase for loop in m.loops)
-    down = max(loop.down for loop in m.loops)
-    return (
-        f"{readable(down, 3)} to {readable(up, 3)}",
-        least(phase, lambda value: f"{readable(value, 3)}°"),
-        readable(m.return_difference, 3),
-        readable(m.disk, 3),
-        least(m.delay, lambda value: f"{readable(1e3 * value, 3)} ms"),
+        return ("—",) * 7
+    one = LoopMargins(
+        down=max(loop.down for loop in m.loops),
+        up=min(loop.up for loop in m.loops),
+        phase=min(loop.phase for loop in m.loops),
     )
+    several = (readable(m.return_difference, 3), readable(m.disk, 3))
+    return *_loop_cells(one), *_loop_cells(m.common), *several, _any(m.delay, 1e3, " ms")
+
+
+def _loop_cells(m: LoopMargins) -> tuple[str, str]:
+    return f"{readable(m.down, 3)} to {readable(m.up, 3)}", _any(m.phase, 1.0, "°")
+
+
+def _any(value: float, factor: float, unit: str) -> str:
+    return f"{readable(factor * value, 3)}{unit}" if np.isfinite(value) else "any"
 
 
 def _proved(c: Certified) -> str:

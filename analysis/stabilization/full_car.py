@@ -23,6 +23,8 @@ VARIED = ("m", "c1", "c2")
 """What is varied: the body's mass, its moments of inertia in proportion, and the struts' stiffness, front and rear each
 for itself. A and B are affine in 1/m, in c1 and in c2."""
 INERTIAS = ("Jx", "Jy", "Jz")
+AXLES = ((0, 1), (2, 3))
+"""The struts fl, fr, rl, rr by what commands them: in the half-car design one signal goes to both of an axle."""
 
 
 def strut_gain(K: Array) -> Array:

@@ -3,6 +3,7 @@ the half-car and the full-car design are."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import product
 
@@ -18,7 +19,7 @@ from fmu_src.vehicle.parameters import Car
 
 from ..methods.polynomials import Array
 from .certified import Certified, Plant, around, certify, growth
-from .full_car import car_plant, full_gain, half_car_plant, strut_gain, varied_values
+from .full_car import AXLES, car_plant, full_gain, half_car_plant, strut_gain, varied_values
 from .half_car import Model, come_down, corrected, over_the_bump, printed, printed_control
 from .limit import Approach, approach
 from .margins import Margins, margins
@@ -182,13 +183,18 @@ def weigh(car: HalfCar, road: RoadParameters) -> Weighted:
         solution=solution,
         approach=approach(solution.regulator),
         half=robustness(half_car_plant(car), K, varied_values(car)),
-        half_on_car=robustness(car_plant(whole), strut_gain(K), varied_values(whole)),
+        half_on_car=robustness(car_plant(whole), strut_gain(K), varied_values(whole), AXLES),
         full_on_car=robustness(car_plant(whole), full_gain(FullCar(car=whole, lam=car.lam)), varied_values(whole)),
     )
 
 
-def robustness(plant: Plant, K: Array, values: dict[str, float]) -> Robustness:
-    """Of u = K x on the plant at these values of its parameters, and in the box of ± SPREAD around them."""
+def robustness(
+    plant: Plant, K: Array, values: dict[str, float], signals: Sequence[Sequence[int]] | None = None
+) -> Robustness:
+    """Of u = K x on the plant at these values of its parameters, and in the box of ± SPREAD around them.
+
+    signals : the actuators that one signal commands, see `margins`.
+    """
     A, B = (np.array(matrix, dtype=float) for matrix in plant(values))
     nominal = growth(plant, K, values)
     factors = product(np.linspace(1.0 - SPREAD, 1.0 + SPREAD, LATTICE), repeat=len(values))
@@ -196,7 +202,7 @@ def robustness(plant: Plant, K: Array, values: dict[str, float]) -> Robustness:
     return Robustness(
         growth=nominal,
         worst=max(growth(plant, K, each) for each in lattice),
-        margins=margins(A, B, K) if nominal < 0.0 else None,
+        margins=margins(A, B, K, signals) if nominal < 0.0 else None,
         certified=certify(plant, K, around(values, SPREAD)),
     )
 
