@@ -275,7 +275,8 @@ def test_in_the_loop_the_estimate_tracks_the_states_and_samples_may_fall_between
 @pytest.mark.parametrize("design_of", ["half-car", "full-car"])
 def test_with_the_default_sensors_control_is_better_than_none(design_of: str) -> None:
     """Whatever the noise: what the design sees settles sooner than without control, 1.56, 0.81, 0.90 s."""
-    lqr, sensors = read_scenario("bump-lqr"), {"design": design_of, "sample_time": 0.01, "feedback": "estimate"}
+    lqr = read_scenario("bump-lqr")
+    sensors: dict[str, Any] = {"design": design_of, "sample_time": 0.01, "feedback": "estimate"}
     for seed in (1.0, 5.0):
         found = ride(simulate(replace(lqr, stop_time=3.0, parameters={**lqr.parameters, **sensors, "seed": seed})))
         assert np.all(found.settled <= [1.45, 0.82, 0.80]), found.settled  # measured: 1.39, 0.81, 0.61

@@ -10,6 +10,8 @@ from typing import Any
 
 import numpy as np
 
+from fmu_src.controller.halfcar import HalfCar
+
 from ..errors import InputError
 from ..figures import Subject, readable, render
 from ..files import write_whole
@@ -35,6 +37,13 @@ BROKEN = (
     "half-car design, a strut's in the full-car design; all: what all stand together if they are wrong by the same."
 )
 DEFAULT = f"{CHOICE} are this project's choice: the paper gives none."
+HALF_CAR = HalfCar()
+CAR = (
+    f"Of the default car: m = {HALF_CAR.m:g} kg, J = {HALF_CAR.Jy:g} kg m², a = {HALF_CAR.a:g} m, "
+    f"b = {HALF_CAR.b:g} m, per axle c1 = {2 * HALF_CAR.c1:g} N/m, c2 = {2 * HALF_CAR.c2:g} N/m, "
+    f"b1 = {2 * HALF_CAR.b1:g} N s/m, b2 = {2 * HALF_CAR.b2:g} N s/m; "
+    "representative of a small car, not the paper's, whose data are not public."
+)
 
 
 def run(folder: Path | None) -> int:
@@ -117,7 +126,7 @@ def findings(result: Study) -> list[Finding]:
 def as_json(result: Study) -> dict[str, Any]:
     """All numbers, unrounded; what is infinite as null."""
     return {
-        "note": DEFAULT,
+        "note": f"{DEFAULT} {CAR}",
         "t_B2": result.begin,
         "models": [_solution_json(s) for s in (result.default, *result.printed)],
         "agreement": asdict(result.agreement),
@@ -191,7 +200,7 @@ def text(result: Study) -> str:
     models = (result.default, *result.printed)
     return "\n\n".join(
         [
-            DEFAULT,
+            f"{DEFAULT}\n{CAR}",
             "Half car behind the bump, by the equations used:\n" + _table(
                 ("(4.1)", "rank B", "growth of A", "weakest mode", "J", "max |u1|", "max |u2|", "effort to rest"),
                 [_model_row(s) for s in models],
