@@ -102,7 +102,9 @@ def _parser() -> argparse.ArgumentParser:
     verb.add_argument("-o", "--out", type=Path, metavar="DIR", help="folder for the table (default for a run: the run)")
     verb.set_defaults(do=_spatial)
 
-    verb = verbs.add_parser("stabilize", help="optimal stabilization of section 4 and its robustness; needs no run")
+    verb = verbs.add_parser(
+        "stabilize", help="optimal stabilization of section 4 and its robustness, of the default car; needs no run"
+    )
     verb.add_argument(
         "-o", "--out", type=Path, metavar="DIR", help="also write stabilization.md, .json and figures there"
     )
@@ -176,13 +178,15 @@ def _certify_shortly(run: Run, folder: Path) -> None:
 
 
 def _ride(options: argparse.Namespace) -> int:
-    from .ride import ride, table
+    from .ride import notes, ride, table
 
-    rows = table([ride(read_run(folder)) for folder in options.runs])
+    runs = [read_run(folder) for folder in options.runs]
+    rows = table([ride(run) for run in runs])
     print("| | unit |", " | ".join(_headings(options.runs)), "|")
     print("|---|---|" + "---:|" * len(options.runs))
     for words, unit, values in rows:
         print(f"| {words} | {unit} |", " | ".join(f"{v:.3g}" if v == v else "not in this run" for v in values), "|")
+    print("".join(f"\n{note}\n" for note in notes(runs)), end="")
     return 0
 
 

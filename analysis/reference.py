@@ -63,11 +63,11 @@ def _law(p: ControlParameters) -> Callable[[float, Sequence[float]], Forces]:
 def closed_loop(scenario: Scenario, times: Array, *, rtol: float = 1e-12) -> Array:
     """The 14 states at `times` (n,) of car, road and controller as one system; shape (n, 14).
 
-    The controller acts continuously, or with a sample time at its samples; the forces of lagging actuators are states
-    of the system.
+    The controller acts continuously, or with a sample time at its samples, which the times, as communication points,
+    make: the first at or after each multiple. The forces of lagging actuators are states of the system.
     """
     control = control_parameters(scenario.parameters)
-    loop, lag = Loop(control.hardware, _law(control)), control.hardware.actuator_lag
+    loop, lag = Loop(control.hardware, _law(control), control.end), control.hardware.actuator_lag
     x0 = [scenario.start.get(q.name, 0.0) for q in STATES]
     y0 = np.array([*x0, *NONE] if lag else x0)
 
@@ -83,15 +83,17 @@ def closed_loop(scenario: Scenario, times: Array, *, rtol: float = 1e-12) -> Arr
     if not control.hardware.sample_time:
         switches = [t - SNAP for t in (control.begin, control.end) if control.enabled and t < times[-1]]
         return path(loop.command, switches, y0, times)[:, :14]
-    return _sampled(loop, path, y0, times, control.hardware.sample_time)[:, :14]
+    due = [loop.number(t) for t in times]
+    over = times >= (control.end if control.enabled else np.inf) - SNAP
+    changes = [k for k in range(1, len(times)) if due[k] != due[k - 1] or over[k] != over[k - 1]]
+    return _sampled(loop, path, y0, times, times[changes])[:, :14]
 
 
-def _sampled(loop: Loop, path: Callable[..., Array], y: Array, times: Array, sample_time: float) -> Array:
-    """Rows (n, …) at `times` from y on, with the command held from sample to sample."""
+def _sampled(loop: Loop, path: Callable[..., Array], y: Array, times: Array, looks: Array) -> Array:
+    """Rows (n, …) at `times` from y on, with the command held from one look at the states [s] to the next."""
     found, memory = np.empty((len(times), len(y))), Memory()
     found[0] = y
-    numbers = range(loop.number(times[0]) + 1, loop.number(times[-1]) + 1)
-    for begin, end in pairwise([times[0], *(sample_time * n for n in numbers), times[-1]]):
+    for begin, end in pairwise([times[0], *looks.tolist(), times[-1]]):
         if len(y) > 14:
             memory = memory._replace(reached=_four(y[14:].tolist()))
         memory = loop.sampled(begin, y[:14].tolist(), memory)

@@ -7,16 +7,21 @@ from typing import Any
 
 import numpy as np
 from scipy import signal
+from scipy.interpolate import CubicSpline
 
 from fmu_src.quantities import ACCELERATIONS, FORCES, POSITIONS, STRUT_TRAVELS, TYRE_FORCES
+from fmu_src.vehicle.parameters import Car
 
 from .errors import InputError
+from .reference import car_of
 from .trajectory import Array, Run
 from .tyres import static_loads, time_below_zero, tyre_loads
 
 BODY = POSITIONS[:3]  # heave, roll, pitch
 BAND = 0.05  # of its largest value: a motion within it from then on has settled
 RUNNING = 1.0  # s; time of the running root mean square
+FINE = 1e-3  # s; the weighting's filter is bent at high frequencies by samples further apart
+COARSE = 0.01  # s; rows further apart hold too little of the acceleration up to 16 Hz
 NEEDED = (*BODY, ACCELERATIONS[0], *STRUT_TRAVELS, *TYRE_FORCES, *FORCES)
 
 
@@ -47,8 +52,9 @@ def ride(run: Run) -> Ride:
     duration = time[-1] - time[0]
     steps = np.diff(time)[:, None]
     deviations = np.sqrt(np.sum(steps * (loads[1:] - static_loads(run)) ** 2, axis=0) / duration)
+    rest = body_period(car_of(run.parameters))
     return Ride(
-        settled=np.array([settling_time(time, column) for column in body.T]),
+        settled=np.array([settling_time(time, column, rest) for column in body.T]),
         peaks=np.abs(body).max(axis=0),
         weighted=weighted,
         transient=transient,
@@ -65,12 +71,22 @@ def lacking(run: Run) -> list[str]:
     return [q.name for q in NEEDED if q.name not in run.trajectory.names]
 
 
-def settling_time(time: Array, x: Array) -> float:
-    """When [s] |x| is for the last time beyond `BAND` of its largest value; nan if that is so at the end."""
+def body_period(car: Car) -> float:
+    """Of the body's heave on its struts [s]; infinite without struts."""
+    stiffness = 2.0 * (car.c1 + car.c2)
+    return float(2.0 * np.pi * np.sqrt(car.m / stiffness)) if stiffness else float("inf")
+
+
+def settling_time(time: Array, x: Array, rest: float) -> float:
+    """When [s] |x| is for the last time beyond `BAND` of its largest value; nan if the time `rest` [s] does not follow.
+
+    Without that a motion that happens to cross zero at the end would have settled.
+    """
     beyond = np.flatnonzero(np.abs(x) > BAND * np.abs(x).max())
     if not beyond.size:
         return float(time[0])
-    return float(time[beyond[-1] + 1]) if beyond[-1] + 1 < len(time) else float("nan")
+    after = time[beyond[-1] + 1 :]
+    return float(after[0]) if after.size and after[-1] - after[0] >= rest else float("nan")
 
 
 # ------------------------------------------------------------------ ISO 2631-1, vertical: Wk
@@ -100,16 +116,36 @@ def wk_filter(step: float) -> Array:
 def weighted_acceleration(time: Array, a: Array) -> tuple[float, float]:
     """Root mean square [m/s²] of the acceleration a weighted by Wk, and the largest of those over a running second.
 
-    The last row of a run whose stop time is no multiple of its step is left out.
+    Between rows further apart than `FINE` the acceleration is taken from a cubic spline, which keeps a vibration of
+    16 Hz within 1 % up to `COARSE`. The last row of a run whose stop time is no multiple of its step is left out.
     """
     if len(time) < 3:
         return float("nan"), float("nan")
     step = time[1] - time[0]
     even = len(time) if abs(time[-1] - time[-2] - step) < 1e-6 * step else len(time) - 1
-    squares = np.asarray(signal.sosfilt(wk_filter(step), a[:even])) ** 2
+    parts = int(np.ceil(step / FINE - 1e-6))
+    fine, step = a[:even], step / parts
+    if parts > 1:
+        fine = CubicSpline(time[:even], fine)(time[0] + step * np.arange((even - 1) * parts + 1))
+    squares = np.asarray(signal.sosfilt(wk_filter(step), fine)) ** 2
     mean = np.concatenate([[0.0], np.cumsum(squares)])
     n = min(max(1, round(RUNNING / step)), len(squares))
     return float(np.sqrt(squares.mean())), float(np.sqrt(((mean[n:] - mean[:-n]) / n).max()))
+
+
+def notes(runs: list[Run]) -> list[str]:
+    """What the numbers of these runs, side by side, do not say."""
+    times = [run.trajectory.time for run in runs]
+    durations = [f"{t[-1] - t[0]:g}" for t in times]
+    found = []
+    if len(set(durations)) > 1:
+        found.append(f"The runs last {', '.join(durations)} s: r.m.s. values are over each one's own time.")
+    if coarse := [f"{t[1] - t[0]:g}" for t in times if t[1] - t[0] > COARSE * (1 + 1e-6)]:
+        found.append(
+            f"Rows {', '.join(coarse)} s apart: the weighted acceleration lacks what they do not hold; wanted steps of "
+            f"at most {COARSE:g} s."
+        )
+    return found
 
 
 # ------------------------------------------------------------------ the table

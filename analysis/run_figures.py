@@ -91,11 +91,11 @@ def is_controlled(run: Run) -> bool:
 
 def subjects(run: Run, counterpart: Run | None, other_design: Run | None = None) -> list[Subject]:
     """All figures that this run can give; the controller's, if it or its counterpart has one at work."""
-    pair = {is_controlled(each): each.trajectory for each in (run, counterpart) if each}
+    pair = {is_controlled(each): each for each in (run, counterpart) if each}
     made = _paper_figures(run)
     if len(pair) == 2:
         made.append(_comparison(pair[True], pair[False], other_design))
-    if True in pair and _acts(pair[True]):
+    if True in pair and _acts(pair[True].trajectory):
         made.append(_strut_forces(pair[True], "" if is_controlled(run) else " They are those of the counterpart run."))
     return [*made, _tyre_loads(run), _linear_approximation(run)]
 
@@ -164,10 +164,10 @@ def _acts(trajectory: Trajectory) -> bool:
     return not set(names) <= set(trajectory.names) or bool(trajectory.columns(names).any())
 
 
-def _comparison(controlled: Trajectory, uncontrolled: Trajectory, other_design: Run | None) -> Subject:
+def _comparison(controlled: Run, uncontrolled: Run, other_design: Run | None) -> Subject:
     curves: list[tuple[Trajectory, str, Any, str]] = [
-        (controlled, RED, "-", "optimal stabilization"),
-        (uncontrolled, BLUE, DASHED, "without control forces"),
+        (controlled.trajectory, RED, "-", "optimal stabilization"),
+        (uncontrolled.trajectory, BLUE, DASHED, "without control forces"),
     ]
     another = ""
     if other_design:
@@ -181,7 +181,7 @@ def _comparison(controlled: Trajectory, uncontrolled: Trajectory, other_design: 
             f"As figure 9 of the paper. Red: optimal stabilization; blue: without control forces.{another} Heave z, "
             "up; pitch φ, positive nose down (the paper's section 4 has it front up); below them roll ψ, which the "
             "half-car design does not see. Here the car is the full one, with seven degrees of freedom; the paper's is "
-            "the half car: python -m analysis stabilize draws that, and figure 8."
+            f"the half car: python -m analysis stabilize draws that, and figure 8. {_choice(controlled)}"
         ),
         panels=[partial(plot_comparison, curves, q) for q in (Z, PHI, PSI)],
         sources=[trajectory for trajectory, *_ in curves],
@@ -189,13 +189,25 @@ def _comparison(controlled: Trajectory, uncontrolled: Trajectory, other_design: 
     )
 
 
-def _strut_forces(trajectory: Trajectory, whose: str) -> Subject:
+def _choice(run: Run) -> str:
+    """What of the control's weights and of the car is a choice, with the values of the run."""
+    lam, H1 = run.reals("lambda", "H1")
+    end = f"T = {run.reals('T')[0]:g} s" if run.parameters["horizon"] == "finite" else "infinite horizon"
+    return (
+        f"λ = {lam:g} N²/m², H1 = {H1:g} m, {end} and the car's data are this project's choice or the scenario's: the "
+        "paper gives none."
+    )
+
+
+def _strut_forces(run: Run, whose: str) -> Subject:
+    trajectory = run.trajectory
     return Subject(
         file="figure-10-control-forces.svg",
         title="Control forces of the struts",
         caption=lambda: (
             "As figure 10 of the paper, by strut: positive pushes the body up and the wheel down. The paper's forces, "
-            f"per axle and positive down on the body, are u₁ = −(u₁₁ + u₁₂) and u₂ = −(u₂₁ + u₂₂).{whose}"
+            f"per axle and positive down on the body, are u₁ = −(u₁₁ + u₁₂) and u₂ = −(u₂₁ + u₂₂).{whose} "
+            + _choice(run)
         ),
         panels=(partial(plot_quantities, trajectory, FORCES),),
         sources=(trajectory,),

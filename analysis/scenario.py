@@ -241,7 +241,7 @@ class _Check:
             )
 
     def control(self, s: Scenario) -> None:
-        """Whether control lasts a step; what else may be wrong with it, the controller says in its own words."""
+        """Whether control lasts a step and ever acts; what else may be wrong the controller says in its own words."""
         with contextlib.suppress(ParameterError):
             p = control_parameters(s.parameters)
             if p.enabled and p.end - p.begin < s.step - SNAP:
@@ -250,6 +250,8 @@ class _Check:
                     "T",
                     f"T = {p.end!r} s: wanted at least a step of {s.step!r} s of control, begun at {p.begin:g} s",
                 )
+            elif not self.faults and (fault := p.fault_of_start(s.start_time)):
+                self.fault("parameters", "T", fault)
 
 
 def _shown(value: Any) -> str:

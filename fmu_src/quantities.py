@@ -259,7 +259,7 @@ HARDWARE = (
         unit="m/s2",
         symbol=r"\sigma_a",
         text="noise of the accelerometers, standard deviation",
-        start=0.05,
+        start=0.02,
         positive=True,
     ),
     Quantity(
@@ -267,7 +267,7 @@ HARDWARE = (
         unit="m",
         symbol=r"\sigma_s",
         text="noise of the strut travel sensors, standard deviation",
-        start=5e-4,
+        start=5e-5,
         positive=True,
     ),
     Quantity(
@@ -275,7 +275,7 @@ HARDWARE = (
         unit="m",
         symbol=r"\sigma_h",
         text="road height that the filter reckons with, anew for each sample and wheel, standard deviation",
-        start=3e-3,
+        start=2e-4,
         positive=True,
     ),
     Quantity(name="seed", unit="1", symbol="n", text="which noise: the same number, the same noise", start=1.0),

@@ -33,6 +33,7 @@ def made_up_run(
         "controller": {
             "design": "half-car",
             "lambda": 1e10,
+            "H1": 1.0,
             "T": 2.3,
             "horizon": "finite",
             "activation": "come-down",

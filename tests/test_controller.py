@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import json
+import re
 import subprocess
 import sys
 import zipfile
 from dataclasses import replace
 from pathlib import Path
-from time import process_time
 from typing import Any
 
+import control
 import numpy as np
 import pytest
 from conftest import ROOT
@@ -23,7 +24,7 @@ from build import DESIGNS, PACKAGE
 from fmu_src.controller.design import FILE_NAMES, Design, design, problem, store, stored
 from fmu_src.controller.fullcar import FullCar
 from fmu_src.controller.halfcar import HalfCar, half_car_state, strut_forces
-from fmu_src.controller.law import ControlParameters, control_law
+from fmu_src.controller.law import ControlParameters, control_law, control_parameters
 from fmu_src.controller.lqr_controller import LqrController
 from fmu_src.controller.riccati import finite_horizon, infinite_horizon, riccati_rate
 from fmu_src.quantities import ParameterError
@@ -195,11 +196,48 @@ def test_a_step_longer_than_the_whole_control_is_refused_and_a_shorter_one_is_no
     assert not replace(control, enabled=False).fault_of_step(t, 0.01)
     host = Host(folder)
     assert host.set({"tau0": 0.0, "T": T}) == host.set_string(host.reference["horizon"], horizon) == OK
-    assert host.start(t) == OK
+    assert host.start(0.28) == OK
     assert host.step(t, 0.01) == status
     if status == DISCARD:
         assert "T = 0.302 s: wanted at least a step of 0.01 s of control, got 0.002 s from 0.3 s on" in str(host.log)
         assert host.step(t, 0.002) == OK
+    host.free()
+
+
+@pytest.mark.parametrize(
+    ("parameters", "start", "said"),
+    [
+        (
+            {"T": 0.39, "sample_time": 0.1},
+            0.0,
+            r"T = 0\.39 s, sample_time = 0\.1 s: .* sample .* from 0\.32 s on, .* at 0\.4 s",
+        ),
+        ({"T": 0.4, "sample_time": 0.1}, 0.0, "the first at 0.4 s"),
+        ({"T": 0.41, "sample_time": 0.1}, 0.0, None),
+        ({"T": 0.39, "sample_time": 0.1}, 0.35, None),  # the run's first sample is one of control
+        ({"T": 0.9}, 0.9, r"T = 0\.9 s: wanted an end of control after the start of the run at 0\.9 s"),
+        ({"T": 0.9}, 1.0, "after the start of the run at 1 s"),
+        ({"T": 0.9}, 0.8, None),
+        ({"T": 0.9, "enabled": False}, 1.0, None),
+        ({"T": 0.9, "horizon": "infinite", "sample_time": 0.7}, 1.0, None),
+    ],
+)
+def test_a_run_in_which_control_would_never_act_is_refused(
+    folder: Path, parameters: dict[str, Any], start: float, said: str | None
+) -> None:
+    host = Host(folder)
+    for name, value in {"tau0": 0.02, **parameters}.items():
+        if isinstance(value, str):
+            assert host.set_string(host.reference[name], value) == OK
+        elif isinstance(value, bool):
+            assert host.set_boolean(host.reference[name], value) == OK
+        else:
+            assert host.set({name: value}) == OK
+    fault = control_parameters({"tau0": 0.02, **parameters}).fault_of_start(start)
+    assert (host.start(start) == OK) is (said is None) is (fault is None)
+    if said:
+        assert re.search(said, str(fault))
+        assert str(fault) in str(host.log)
     host.free()
 
 
@@ -214,7 +252,30 @@ def test_a_design_that_needs_missing_packages_says_what_to_install() -> None:
     )
     said = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True).stdout
     assert "not installed: numpy" in said
-    assert "Install 'control'" in said
+    assert "Install numpy and scipy" in said
+
+
+@pytest.mark.parametrize("car", [HalfCar(lam=3e10), FullCar(lam=3e10, lambda_tyre=1e9)])
+def test_the_gain_of_the_infinite_horizon_is_that_of_python_control(car: HalfCar | FullCar) -> None:
+    A, B, Q, R, _ = problem(car)
+    L, K = infinite_horizon(A, B, Q, R)
+    gain, solution, poles = control.lqr(A, B, Q, R)
+    assert_allclose(K, -gain, rtol=0, atol=1e-9 * np.abs(gain).max())
+    assert_allclose(L, solution, rtol=0, atol=1e-9 * np.abs(L).max())
+    assert_allclose(np.sort_complex(np.linalg.eigvals(A + B @ K)), np.sort_complex(poles), rtol=1e-6)
+
+
+def test_a_design_of_14_states_in_a_fresh_process_takes_well_under_a_second() -> None:
+    """Measured: 0.2 s of CPU time, imports included; python-control alone would bring 0.9 s more."""
+    code = (
+        "import sys, time\nfrom fmu_src.controller.design import design\n"
+        "from fmu_src.controller.fullcar import FullCar\ndesign(FullCar(lam=2e10), infinite=True, span=2.0)\n"
+        "print([m for m in ('control', 'scipy.signal', 'scipy.integrate') if m in sys.modules], time.process_time())\n"
+    )
+    said = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True).stdout
+    imported, _, seconds = said.rpartition(" ")
+    assert imported == "[]"
+    assert float(seconds) < 1.0
 
 
 @pytest.mark.parametrize("car", [HalfCar(), FullCar()])
@@ -274,10 +335,31 @@ def test_a_control_too_fast_for_any_table_is_refused_with_the_reason() -> None:
         design(undamped, infinite=False, span=1e5)
     with pytest.raises(ParameterError, match=r"^b1 = 0\.0 .*lambda = 0\.0 .* no stabilizing solution"):
         design(undamped, infinite=True, span=None)
-    with pytest.raises(ParameterError, match=r"^b1 = 0\.0 .*lambda = 1e-20 .* imaginary axis"):
+    with pytest.raises(ParameterError, match=r"^b1 = 0\.0 .*lambda = 1e-20 .* no stabilizing solution"):
         design(HalfCar(lam=1e-20, b1=0.0, b2=0.0), infinite=True, span=None)
     with pytest.raises(ParameterError, match=r"^c1 = 1e\+16 N/m: .* no stabilizing solution in double precision"):
         design(HalfCar(c1=1e16), infinite=True, span=None)
+
+
+@pytest.mark.parametrize(
+    "car",
+    [
+        FullCar(car=Car(b1=0.0, b2=0.0), H2=0.0),  # roll
+        HalfCar(a=1.25, b=1.25, c1=15e3, c2=15e3, b1=0.0, b2=0.0, H1=0.0),  # pitch
+    ],
+)
+@pytest.mark.parametrize("infinite", [True, False])
+def test_an_undamped_mode_that_costs_nothing_is_on_the_axis_and_so_refused(
+    car: HalfCar | FullCar, infinite: bool
+) -> None:
+    """In doubles its poles lie some 1e-10 to the left; in truth nothing moves them."""
+    with pytest.raises(ParameterError, match=r"b1 = 0\.0 .* no stabilizing solution"):
+        design(car, infinite=infinite, span=None if infinite else 1.0)
+
+
+def test_a_little_damping_of_such_a_mode_is_enough() -> None:
+    made = design(FullCar(car=Car(b1=0.1, b2=0.1), H2=0.0), infinite=True, span=None)
+    assert made.infinite is not None
 
 
 def test_without_weights_a_damped_car_is_left_alone() -> None:
@@ -286,11 +368,3 @@ def test_without_weights_a_damped_car_is_left_alone() -> None:
         assert made.infinite is not None and made.finite is not None
         assert not any(made.infinite)
         assert not any(made.finite.gain(0.5))
-
-
-def test_the_design_of_14_states_takes_well_under_a_second() -> None:
-    """Measured: 0.05 s of CPU time for the finite horizon, 0.01 s for the infinite one."""
-    design(FullCar(lam=2e10), infinite=True, span=2.0)  # imports
-    before = process_time()
-    design(FullCar(), infinite=True, span=2.0)
-    assert process_time() - before < 0.5

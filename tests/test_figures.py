@@ -34,6 +34,18 @@ def test_each_figure_names_its_number_in_the_paper(tmp_path: Path, monkeypatch: 
     assert numbers(run, run) == numbers(run, None)  # a counterpart that is none
 
 
+@pytest.mark.parametrize("horizon", ["finite", "infinite"])
+def test_figures_9_and_10_say_that_the_weights_are_a_choice_and_which(horizon: str) -> None:
+    controlled, run = made_up_run(enabled=True), made_up_run(enabled=False)
+    controlled.record["parameters"]["controller"].update({"lambda": 3e9, "H1": 1.5, "T": 1.9, "horizon": horizon})
+    end = "T = 1.9 s" if horizon == "finite" else "infinite horizon"
+    for made in (run_figures.subjects(controlled, run), run_figures.subjects(run, controlled)):
+        captions = [s.caption() for s in made if s.caption().startswith(("As figure 9 ", "As figure 10 "))]
+        assert len(captions) == 2
+        for caption in captions:
+            assert f"λ = 3e+09 N²/m², H1 = 1.5 m, {end} and the car's data are this project's choice" in caption
+
+
 def test_the_comparison_draws_the_controlled_car_in_red_whichever_run_it_is() -> None:
     run, controlled = made_up_run(), made_up_run(enabled=True)
     controlled.trajectory.values[:] *= 2.0

@@ -162,7 +162,8 @@ def test_texts_say_what_is_needed(dist: Path, model: str) -> None:
     needs = files["documentation/externalDependencies.txt"].decode("ascii")
     for word in ("CPython 3.10", "LD_PRELOAD", "PYTHONHOME", "sys.base_prefix", "_Py_NoneStruct", "glibc 2.32"):
         assert word in needs
-    assert ("control>=" in needs) == (model == "LqrController")
+    assert ("scipy>=" in needs) == (model == "LqrController")
+    assert "control>=" not in needs
 
 
 WITHOUT_NUMPY = """
@@ -214,10 +215,10 @@ def test_pythonfmu_deploy_installs_what_other_designs_need(dist: Path, monkeypat
 
     monkeypatch.setattr(deploy.subprocess, "run", pip)
     deploy.deploy(dist / "LqrController.fmu")
-    assert [re.match(r"\w+", line)[0] for line in installed] == ["control", "numpy", "scipy"]  # type: ignore[index]
+    assert [re.match(r"\w+", line)[0] for line in installed] == ["numpy", "scipy"]  # type: ignore[index]
     modules = [Path(build.PACKAGE, "controller", name).read_text() for name in ("design.py", "riccati.py")]
     imported = set(re.findall(r"^ +(?:import|from) (\w+)", "\n".join(modules), re.MULTILINE))
-    assert imported == {"control", "numpy", "scipy"}
+    assert imported == {"numpy", "scipy"}
 
 
 # ------------------------------------------------------------------ the reference experiment

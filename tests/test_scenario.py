@@ -114,6 +114,15 @@ def test_control_shorter_than_a_step_is_refused(tmp_path: Path) -> None:
     assert read(tmp_path, "[simulation]\nstep = 0.01\n[parameters]\nT = 0.305\nenabled = false")
 
 
+def test_control_that_would_never_act_is_refused(tmp_path: Path) -> None:
+    ((line, said),) = faults(tmp_path, "[simulation]\nstart_time = 1.0\n[parameters]\nT = 0.9")
+    assert (line, said) == (4, "T = 0.9 s: wanted an end of control after the start of the run at 1 s")
+    ((line, said),) = faults(tmp_path, "[parameters]\nsample_time = 0.1\nT = 0.39")
+    assert line == 3
+    assert said.startswith("T = 0.39 s, sample_time = 0.1 s: wanted a sample within the control from 0.32 s on, got")
+    assert read(tmp_path, "[simulation]\nstart_time = 1.0\n[parameters]\nT = 0.9\nenabled = false")
+
+
 # ------------------------------------------------------------------ a run.json is a scenario again
 def record(folder: Path, scenario: object) -> str:
     path = folder / "run.json"

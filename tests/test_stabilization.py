@@ -35,6 +35,7 @@ from analysis.stabilization.half_car import (
     printed_control,
 )
 from analysis.stabilization.limit import approach
+from analysis.stabilization.margins import LoopMargins, Margins
 from analysis.stabilization.pontryagin import by_collocation, by_exponentials, hamiltonian
 from analysis.stabilization.regulator import (
     Arc,
@@ -282,9 +283,12 @@ def test_the_command_writes_table_json_and_figures(
     assert [model["rank of B"] for model in data["models"]] == [2, 1, 1]
     assert all(f["holds"] for f in data["findings"])
     proved = [[w[f"{d}-car design, car"]["certified"]["proved"] for w in data["weights"]] for d in ("half", "full")]
-    assert proved == [[1.0, 0.0], [1.0, 1.0]]
+    assert proved == [[1.0, 0.0], [1.0, 0.0]]
+    assert 1e12 < data["car unstable somewhere in the box from lambda"] < 0.3 * data["car unstable from lambda"]
     own = [growth(car_plant(Car()), full_gain(FullCar(lam=w["lambda"])), varied_values(Car())) for w in data["weights"]]
     assert [w["full-car design, car"]["growth"] for w in data["weights"]] == pytest.approx(own)
+    broken = [data["weights"][0][f"{d}-car design, car"]["margins"]["loops"] for d in ("half", "full")]
+    assert [len(loops) for loops in broken] == [2, 4]  # what one signal commands: axles, struts
     figures = sorted(path.name for path in tmp_path.glob("*.svg"))
     assert figures == [f"stabilization-{n}.svg" for n in ("08-L14", "09-motion", "10-forces", "limit", "printed")]
     page = (tmp_path / document.PAGE).read_text(encoding="utf-8")
@@ -294,6 +298,40 @@ def test_the_command_writes_table_json_and_figures(
     assert "λ = 1e+10 N²/m², H1 = 1 m, T = 2.3 s are this project's choice" in page
     with pytest.raises(InputError, match="wanted a folder, got a file"):
         document.run(tmp_path / document.FILE)
+
+
+def test_the_cells_of_a_weight_are_L14_cost_forces_and_rates(result: study.Study) -> None:
+    w = result.weighted[0]
+    numbers = [
+        w.solution.L[0, 0, 3],
+        w.solution.cost,
+        *np.abs(w.solution.arc.u).max(axis=1),
+        w.approach.fitted,
+        w.approach.rate,
+    ]
+    cells = document._weight_row(w)
+    assert cells[0] == "1e+10"
+    for cell, number, unit in zip(cells[1:], numbers, ("N²s²/m", "N²s", "N", "N", "1/s", "1/s"), strict=True):
+        value, _, written = cell.partition(" ")
+        assert float(value.replace("−", "-")) == pytest.approx(number, rel=5e-3)
+        assert written == unit
+    row = document._model_row(result.default)
+    assert row[:3] == ("corrected", "2", "−2.43 1/s")
+    assert row[4:] == ("1152 N²s", "20.1 N", "106 N", "0.01364 N²s")
+
+
+def test_the_page_names_the_car_and_says_that_it_is_not_the_papers(result: study.Study) -> None:
+    said = document.text(result)
+    assert "m = 870 kg, J = 1060 kg m², a = 1 m, b = 1.5 m, per axle c1 = 30000 N/m" in said
+    assert "not the paper's" in said and "the default car" in said
+
+
+def test_margins_are_printed_as_the_worst_of_one_signal_and_as_those_of_all() -> None:
+    loops = (LoopMargins(down=0.1, up=5.0, phase=40.0), LoopMargins(down=0.2, up=3.0, phase=np.inf))
+    made = Margins(loops=loops, common=LoopMargins(0.25, 2.5, 30.0), return_difference=0.61, disk=0.72, delay=0.0115)
+    assert document._margin_cells(made) == ("0.2 to 3", "40°", "0.25 to 2.5", "30°", "0.61", "0.72", "11.5 ms")
+    never = replace(made, loops=loops[1:], delay=np.inf)
+    assert document._margin_cells(never)[1] == document._margin_cells(never)[-1] == "any"
 
 
 # ------------------------------------------------------------------ the FMU in the loop

@@ -1,4 +1,4 @@
-"""Stability of A + B K over a whole box of parameters, proved: quadratic Lyapunov functions, in ball arithmetic."""
+"""Stability of A + B K over a whole box of parameters, proved: energies that change with them, in ball arithmetic."""
 
 from __future__ import annotations
 
@@ -9,12 +9,14 @@ from itertools import product
 from typing import Any
 
 import numpy as np
-from flint import arb, arb_mat, fmpq
+from flint import arb, fmpq
 
 from ..bertolino_baksa.balls import decimal, precision
 from ..methods.polynomials import Array
+from .energies import Energy, search
 
-Plant = Callable[[Mapping[str, Any]], tuple[Sequence[Sequence[Any]], Sequence[Sequence[Any]]]]
+Plant = Callable[[Mapping[str, Any]], tuple[Sequence[Any], Sequence[Sequence[Any]], Sequence[Sequence[Any]]]]
+"""parameters -> M (n), S (n, 2n), G (n, m) of M q̈ = S (q, q̇) + G u, M diagonal, in the parameters' kind of number."""
 Box = Mapping[str, tuple[fmpq, fmpq]]
 
 
@@ -22,9 +24,9 @@ Box = Mapping[str, tuple[fmpq, fmpq]]
 class Certified:
     """What became of the box, by shares of its volume, and in how many sub-boxes.
 
-    proved   : A + B K is stable, also if the parameters move about within a sub-box while the system runs.
-    unstable : it is not at the middle and at all corners, in doubles.
-    The rest is open: the budget ended.  witness: the first middle at which it is not stable.
+    proved   : A + B K is stable, whatever the parameters are, as long as they stay.
+    unstable : it is not at all corners, in doubles.
+    The rest is open: the budget ended.  witness: a corner at which it is not stable, the worst of its sub-box.
     """
 
     proved: float
@@ -33,32 +35,31 @@ class Certified:
     witness: dict[str, float] | None
 
 
-def certify(plant: Plant, K: Array, box: Box, budget: int = 300) -> Certified:
+def certify(plant: Plant, K: Array, box: Box, budget: int = 8) -> Certified:
     """Prove that A + B K is stable for all parameters in the box, halving it where it takes more than one function.
 
-    plant : parameters -> (A, B), each entry affine in every single parameter or in every single one's reciprocal, so
-            that A + B K on a box is a mean of its values at the corners. K (m, n) is exactly as its doubles say.
+    plant : M, S and G affine in every single parameter, so that M and S + G K on a box are means of their values at
+            the corners. K (m, 2n) is exactly as its doubles say.
     budget: sub-boxes that are looked at.
 
-    On each sub-box P is the metric in which the modes at its middle are orthonormal; at every corner
-    P (A + B K) + (A + B K)ᵀ P < 0 is then shown with nothing rounded, and holds between them as it is linear in A + BK.
+    On each sub-box an energy (see `energies`) is searched; at every corner V > 0 and V̇ < 0 are then shown with nothing
+    rounded, and hold between them as both are affine in M and S + G K.
     """
     waiting, share = deque([(box, 1.0)]), {"proved": 0.0, "unstable": 0.0}
     boxes, witness = 0, None
     while waiting and boxes < budget:
         here, volume = waiting.popleft()
         boxes += 1
-        middle = {name: float(low + high) / 2.0 for name, (low, high) in here.items()}
-        values, V = np.linalg.eig(closed_loop(plant, K, middle))
-        stable = values.real.max() < 0.0
-        if not stable:
-            witness = witness or middle
-        if stable and _proved(plant, K, here, V):
+        corners = [_doubles(corner) for corner in _corners(here)]
+        rates = np.array([growth(plant, K, corner) for corner in corners])
+        if rates.max() >= 0.0:
+            witness = witness or corners[int(rates.argmax())]
+        if rates.max() < 0.0 and _proved(plant, K, here, rates):
             share["proved"] += volume
-        elif not stable and all(growth(plant, K, _doubles(corner)) >= 0.0 for corner in _corners(here)):
+        elif rates.min() >= 0.0:
             share["unstable"] += volume
         else:
-            waiting.extend((half, 0.5 * volume) for half in _halves(plant, K, here, V))
+            waiting.extend((half, 0.5 * volume) for half in _halves(plant, K, here))
     return Certified(share["proved"], share["unstable"], boxes, witness)
 
 
@@ -68,9 +69,17 @@ def around(values: Mapping[str, float], spread: float) -> Box:
     return {name: (decimal(value) * less, decimal(value) * more) for name, value in values.items()}
 
 
+def state_space(plant: Plant, values: Mapping[str, float]) -> tuple[Array, Array]:
+    """A (2n, 2n), B (2n, m) of x' = A x + B u, x = (q, q̇), in doubles."""
+    M, S, G = (np.array(matrix, dtype=float) for matrix in plant(values))
+    n, m = len(M), G.shape[1]
+    A = np.vstack([np.hstack([np.zeros((n, n)), np.eye(n)]), S / M[:, None]])
+    return A, np.vstack([np.zeros((n, m)), G / M[:, None]])
+
+
 def closed_loop(plant: Plant, K: Array, values: Mapping[str, float]) -> Array:
-    """A + B K (n, n) at these parameters, in doubles."""
-    A, B = (np.array(matrix, dtype=float) for matrix in plant(values))
+    """A + B K (2n, 2n) at these parameters, in doubles."""
+    A, B = state_space(plant, values)
     closed: Array = A + B @ K
     return closed
 
@@ -80,34 +89,40 @@ def growth(plant: Plant, K: Array, values: Mapping[str, float]) -> float:
     return float(np.linalg.eigvals(closed_loop(plant, K, values)).real.max())
 
 
-def _proved(plant: Plant, K: Array, box: Box, V: Any) -> bool:
-    inverse = np.linalg.inv(V / np.linalg.norm(V, axis=0))
-    P = (inverse.conj().T @ inverse).real
-    P = 0.5 * (P + P.T) / np.abs(P).max()
-    for corner in _corners(box):  # in doubles first: that sorts out the most
-        PA = P @ closed_loop(plant, K, _doubles(corner))
-        if np.linalg.eigvalsh(PA + PA.T)[-1] >= 0.0:
-            return False
+def _proved(plant: Plant, K: Array, box: Box, rates: Array) -> bool:
+    """Whether an energy is found and proves this box; rates (2^k,) [1/s] the growth at its corners."""
+    corners = _corners(box)
+    systems = [_closed(plant, K, _doubles(corner)) for corner in corners]
+    M, S = (np.array(part) for part in zip(*systems, strict=True))
+    energy = search(M, S, np.argsort(-rates).tolist())
+    if energy is None:
+        return False
     with precision(1):
-        exact, gain = _balls(P.tolist()), _balls(K.tolist())
-        return _is_positive(exact) and all(_decreases(plant, gain, exact, corner) for corner in _corners(box))
+        gain, exact = _balls(K), Energy(*(_balls(part) for part in (energy.Y, energy.C, energy.X)))
+        return all(_decreases(plant, gain, exact, corner) for corner in corners)
 
 
-def _decreases(plant: Plant, gain: Any, P: Any, corner: Mapping[str, fmpq]) -> bool:
-    """Whether −(P (A + B K) + (A + B K)ᵀ P) is positive definite at this corner."""
-    A, B = (_balls(matrix) for matrix in plant({name: arb(value) for name, value in corner.items()}))
-    PA = P * (A + B * gain)
-    return _is_positive(-(PA + PA.transpose()))
+def _decreases(plant: Plant, gain: Array, energy: Energy, corner: Mapping[str, fmpq]) -> bool:
+    """Whether V > 0 and V̇ < 0 at this corner, for all x ≠ 0; gain and energy of balls."""
+    P, W = energy.forms(*_closed(plant, gain, {name: arb(value) for name, value in corner.items()}))
+    return _is_positive(P.tolist()) and _is_positive((-W).tolist())
 
 
-def _balls(matrix: Sequence[Sequence[Any]]) -> Any:
-    return arb_mat([[arb(entry) for entry in row] for row in matrix])
+def _closed(plant: Plant, K: Array, values: Mapping[str, Any]) -> tuple[Array, Array]:
+    """M (n,), S + G K (n, 2n), in the kind of number of K and of the values."""
+    M, S, G = (np.array(matrix, dtype=K.dtype) for matrix in plant(values))
+    return M, S + G @ K
 
 
-def _is_positive(matrix: Any) -> bool:
-    """Whether all pivots of a symmetric matrix of balls are certainly > 0; then every matrix in it is positive
-    definite."""
-    rows = matrix.tolist()
+def _balls(values: Array) -> Array:
+    """Exactly these doubles."""
+    return np.array([arb(value) for value in values.ravel().tolist()], dtype=object).reshape(values.shape)
+
+
+def _is_positive(matrix: Sequence[Sequence[Any]]) -> bool:
+    """Whether all pivots of a symmetric matrix of balls, taken from its upper half, are certainly > 0; then every
+    symmetric matrix in it is positive definite."""
+    rows = [list(row) for row in matrix]
     n = len(rows)
     for k in range(n):
         pivot = rows[k][k]
@@ -128,10 +143,11 @@ def _corners(box: Box) -> list[dict[str, fmpq]]:
     return [dict(zip(box, values, strict=True)) for values in product(*box.values())]
 
 
-def _halves(plant: Plant, K: Array, box: Box, V: Any) -> list[Box]:
-    """The box halved along the parameter that changes A + B K the most, in the modes' metric."""
+def _halves(plant: Plant, K: Array, box: Box) -> list[Box]:
+    """The box halved along the parameter that changes A + B K the most, in the metric of the modes at its middle."""
     middle = {name: (low + high) / 2 for name, (low, high) in box.items()}
-    inverse = np.linalg.inv(V)
+    _, V = np.linalg.eig(closed_loop(plant, K, _doubles(middle)))
+    inverse = np.linalg.pinv(V)
 
     def effect(name: str) -> float:
         ends = ({**middle, name: end} for end in box[name])

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import fields
 from types import SimpleNamespace
 from typing import Any
@@ -12,17 +12,21 @@ import numpy as np
 from fmu_src.controller.design import design
 from fmu_src.controller.fullcar import FullCar
 from fmu_src.controller.halfcar import HalfCar, half_car_state, strut_forces
-from fmu_src.vehicle.linear import linearized
+from fmu_src.vehicle.linear import linearized, masses
 from fmu_src.vehicle.parameters import Car
 
 from ..bertolino_baksa.balls import decimal
 from ..methods.polynomials import Array
 from .certified import Plant
 
-VARIED = ("m", "c1", "c2")
-"""What is varied: the body's mass, its moments of inertia in proportion, and the struts' stiffness, front and rear each
-for itself. A and B are affine in 1/m, in c1 and in c2."""
-INERTIAS = ("Jx", "Jy", "Jz")
+BODY = ("m", "c1", "c2")
+VARIED = (*BODY, "cp1", "cp2", "m11", "m21")
+"""What is varied: the body's mass and the struts' stiffness, front and rear each for itself; of the car also the tyres'
+stiffness and the wheels' masses, front and rear. M, S and G of M q̈ = S (q, q̇) + G u are affine in all of them."""
+WITH = {"m": ("Jx", "Jy", "Jz"), "m11": ("m12",), "m21": ("m22", "m2", "J2")}
+"""What goes in proportion with a mass: the body's moments of inertia; the other front wheel; the rear axle."""
+AXLES = ((0, 1), (2, 3))
+"""The struts fl, fr, rl, rr by what commands them: in the half-car design one signal goes to both of an axle."""
 
 
 def strut_gain(K: Array) -> Array:
@@ -39,38 +43,44 @@ def full_gain(car: FullCar) -> Array:
 
 
 def half_car_plant(car: HalfCar) -> Plant:
-    """(A, B) of (4.1), corrected, by the parameters of `VARIED`, in any kind of number."""
+    """(4.1), corrected, by the parameters of `BODY`, in any kind of number."""
 
-    def plant(values: Mapping[str, Any]) -> tuple[Any, Any]:
+    def plant(values: Mapping[str, Any]) -> tuple[Any, Any, Any]:
         changed = _varied(car, values)
-        return _property(HalfCar.A, changed), _property(HalfCar.B, changed)
+        M = [changed.m, changed.Jy]
+        A, B = (of.fget(changed) for of in (HalfCar.A, HalfCar.B))  # type: ignore[attr-defined]
+        return M, _forces(M, A), _forces(M, B)
 
     return plant
 
 
 def car_plant(car: Car) -> Plant:
-    """(A, Bu) of the linear car by the parameters of `VARIED`, in any kind of number."""
+    """The linear car under its struts' forces, by the parameters of `VARIED`, in any kind of number."""
 
-    def plant(values: Mapping[str, Any]) -> tuple[Any, Any]:
-        linear = linearized(_varied(car, values))
-        return linear.A, linear.Bu
+    def plant(values: Mapping[str, Any]) -> tuple[Any, Any, Any]:
+        changed = _varied(car, values)
+        M, linear = masses(changed), linearized(changed)
+        return M, _forces(M, linear.A), _forces(M, linear.Bu)
 
     return plant
 
 
 def varied_values(car: HalfCar | Car) -> dict[str, float]:
-    """The car's own values of `VARIED`."""
-    return {name: getattr(car, name) for name in VARIED}
+    """The car's own values of what is varied of it."""
+    return {name: getattr(car, name) for name in (BODY if isinstance(car, HalfCar) else VARIED)}
 
 
-def _property(of: Any, instance: Any) -> Any:
-    return of.fget(instance)
+def _forces(M: Sequence[Any], rows: Sequence[Sequence[Any]]) -> list[list[Any]]:
+    """The lower half of A or B, accelerations, as forces."""
+    return [[mass * each for each in row] for mass, row in zip(M, rows[len(M) :], strict=True)]
 
 
 def _varied(car: HalfCar | Car, values: Mapping[str, Any]) -> Any:
-    """The car's parameters, those of `VARIED` replaced; all of one kind of number, exactly as their decimals say."""
+    """The car's parameters, the varied ones replaced; all of one kind of number, exactly as their decimals say."""
     kind = type(values["m"])
     own = {f.name: getattr(car, f.name) for f in fields(car)}
     own = {name: value if kind is float else kind(decimal(value)) for name, value in own.items()}
-    inertias = {name: own[name] / own["m"] * values["m"] for name in INERTIAS if name in own}
-    return SimpleNamespace(**own | inertias | dict(values))
+    moved = {
+        other: own[other] / own[name] * values[name] for name in values for other in WITH.get(name, ()) if other in own
+    }
+    return SimpleNamespace(**own | moved | dict(values))

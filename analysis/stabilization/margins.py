@@ -1,9 +1,9 @@
-"""How much the loop u = K x may be wrong at its actuators before it loses stability: gain, phase, delay, and all at
-once."""
+"""How much the loop u = K x may be wrong at its actuators before it loses stability: gain, phase, delay; where one
+signal is wrong, and where all are."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -17,11 +17,15 @@ from ..methods.polynomials import Array
 DECADES = (-2.0, 5.0)  # of the frequencies looked at [rad/s]
 PER_DECADE = 200
 MOST_GAIN = 1e6  # what the polynomials of a loop give beyond it is round-off: taken for none
+REAL = 1e-9  # of an eigenvalue's size: an imaginary part below is round-off
+
+Locus = Callable[[float], NDArray[np.complex128]]
+Crossings = list[tuple[float, complex]]
 
 
 @dataclass(frozen=True, slots=True)
 class LoopMargins:
-    """One actuator's: its gain may be multiplied by any number in (down, up); its phase may lag or lead by so much.
+    """The gain may be multiplied by any number in (down, up); the phase may lag or lead by so much.
 
     Phase in degrees, infinite where the loop's gain never reaches 1.
     """
@@ -33,8 +37,8 @@ class LoopMargins:
 
 @dataclass(frozen=True, slots=True)
 class Margins:
-    """of each actuator, the others as they are; and of all at once:
-
+    """loops             : of each signal, the others as they are.
+    common            : of all actuators, whose gains or phases are wrong by the same.
     return_difference : least singular value of I + L(iω), 1 or more for an optimal state feedback with R = ρ I.
     disk              : α of the largest |Δ| with I + L (I + Δ/2)(I − Δ/2)⁻¹ singular for no Δ, of any structure,
                         smaller than α.
@@ -42,31 +46,57 @@ class Margins:
     """
 
     loops: tuple[LoopMargins, ...]
+    common: LoopMargins
     return_difference: float
     disk: float
     delay: float
 
 
-def margins(A: Array, B: Array, K: Array) -> Margins:
-    """Of the stable closed loop x' = (A + B K) x, broken at the actuators."""
+def margins(A: Array, B: Array, K: Array, signals: Sequence[Sequence[int]] | None = None) -> Margins:
+    """Of the stable closed loop x' = (A + B K) x, broken at the actuators.
+
+    signals : the actuators that one signal commands, whose rows of K are equal; each has its own if there are none.
+    """
 
     def L(omega: float) -> NDArray[np.complex128]:
         return -K @ np.linalg.solve(1j * omega * np.eye(len(A)) - A, B)
 
-    unit = np.eye(len(K))
+    unit, omega = np.eye(len(K)), _frequencies()
+    loci = _tracked(np.array([np.linalg.eigvals(L(w)) for w in omega]))
+    crossings = _crossings(L, loci, lambda locus: np.abs(locus) - 1.0)
     return Margins(
-        loops=tuple(loop_margins(A, B, K, i) for i in range(len(K))),
+        loops=tuple(loop_margins(A, B, K, each) for each in signals or [[i] for i in range(len(K))]),
+        common=_common_margins(A, B, K, crossings, _crossings(L, loci, np.imag)),
         return_difference=_least(lambda omega: np.linalg.norm(unit + L(omega), -2)),
         disk=_least(lambda omega: 1.0 / np.linalg.norm(np.linalg.inv(unit + L(omega)) - 0.5 * unit, 2)),
-        delay=delay_margin(L),
+        delay=float(min(((np.angle(e) + np.pi) % (2.0 * np.pi) / w for w, e in crossings), default=np.inf)),
     )
 
 
-def loop_margins(A: Array, B: Array, K: Array, i: int) -> LoopMargins:
-    """Of the i-th actuator alone, by python-control."""
-    others = np.arange(len(K)) != i
-    loop = control.ss(A + B[:, others] @ K[others], B[:, [i]], -K[[i]], 0.0)
+def loop_margins(A: Array, B: Array, K: Array, actuators: Sequence[int]) -> LoopMargins:
+    """Of the signal that goes to these actuators, whose rows of K are equal, alone; by python-control."""
+    others = ~np.isin(np.arange(len(K)), actuators)
+    all_of_it = B[:, actuators].sum(axis=1, keepdims=True)
+    loop = control.ss(A + B[:, others] @ K[others], all_of_it, -K[[actuators[0]]], 0.0)
     gains, phases, *_ = control.stability_margins(loop, returnall=True)
+    return _worst(gains, phases)
+
+
+def _common_margins(A: Array, B: Array, K: Array, unit: Crossings, real: Crossings) -> LoopMargins:
+    """Of all actuators together: 1 + g e^{iθ} λ = 0 for eigenvalues λ of L(iω), at rest (ω = 0) too.
+
+    unit, real : where eigenvalues cross the unit circle, and where the real axis.
+    """
+    at = [e.real for _, e in real]
+    if np.linalg.cond(A) < 1.0 / np.finfo(float).eps:
+        still = np.linalg.eigvals(K @ np.linalg.solve(A, B))
+        at.extend(still.real[np.abs(still.imag) <= REAL * np.abs(still)])
+    gains = np.array([-1.0 / e for e in at if e < 0.0])
+    return _worst(gains, np.degrees([np.angle(-e) for _, e in unit]))
+
+
+def _worst(gains: Array, phases: Array) -> LoopMargins:
+    """The nearest of all factors and of all phases [°] that take the loop to the verge."""
     gains = gains[gains < MOST_GAIN]
     return LoopMargins(
         down=float(max(gains[gains < 1.0], default=0.0)),
@@ -75,25 +105,22 @@ def loop_margins(A: Array, B: Array, K: Array, i: int) -> LoopMargins:
     )
 
 
-def delay_margin(L: Callable[[float], NDArray[np.complex128]]) -> float:
-    """Least τ ≥ 0 [s] with det(I + L(iω) exp(−iωτ)) = 0 for some ω > 0.
-
-    An eigenvalue of L(iω) that crosses the unit circle at the angle θ gives τ = (θ + π)/ω, taken into a turn.
-    """
-    omega = _frequencies()
-    loci = _tracked(np.array([np.linalg.eigvals(L(w)) for w in omega]))
-    found = [np.inf]
+def _crossings(L: Locus, loci: NDArray[np.complex128], measure: Callable[[Any], Any]) -> Crossings:
+    """Frequencies ω > 0 [rad/s] at which `measure` of an eigenvalue of L(iω) changes its sign, and the eigenvalue."""
+    omega, found = _frequencies(), []
     for locus in loci.T:
-        for k in np.flatnonzero(np.diff(np.sign(np.abs(locus) - 1.0))):
+        for k in np.flatnonzero(np.diff(np.sign(measure(locus)))):
             near = locus[k]
 
             def eigenvalue(w: float, near: complex = near) -> complex:
                 values = np.linalg.eigvals(L(w))
                 return complex(values[np.argmin(np.abs(values - near))])
 
-            w = brentq(lambda w, e=eigenvalue: abs(e(w)) - 1.0, omega[k], omega[k + 1], xtol=1e-12, rtol=1e-14)
-            found.append(float((np.angle(eigenvalue(w)) + np.pi) % (2.0 * np.pi)) / w)
-    return min(found)
+            ends = [measure(eigenvalue(w)) for w in omega[k : k + 2]]
+            if ends[0] * ends[1] < 0.0:  # else the eigenvalue is 0 but for round-off
+                w = brentq(lambda w, e=eigenvalue: measure(e(w)), omega[k], omega[k + 1], xtol=1e-12, rtol=1e-14)
+                found.append((w, eigenvalue(w)))
+    return found
 
 
 def _frequencies() -> Array:

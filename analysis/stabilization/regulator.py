@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import control
 import numpy as np
 from scipy.integrate import simpson, solve_ivp
 from scipy.interpolate import BSpline, make_interp_spline
 from scipy.linalg import expm
 
-from fmu_src.controller.riccati import finite_horizon, infinite_horizon
+from fmu_src.controller.riccati import finite_horizon, verify
 from fmu_src.quantities import ParameterError
 
 from ..errors import InputError
@@ -118,14 +119,17 @@ def riccati_solution(regulator: Regulator, span: float) -> BSpline:
 
 
 def stationary(regulator: Regulator) -> tuple[Array, Array]:
-    """(L, K) of remark 4.1, u = K x.
+    """(L, K) of remark 4.1, u = K x, by python-control, whose gain is that of u = −K x.
 
     Raises InputError where the algebraic equation has no stabilizing solution.
     """
+    matrices = (regulator.A, regulator.B, regulator.Q, regulator.R)
     try:
-        return infinite_horizon(regulator.A, regulator.B, regulator.Q, regulator.R)
+        gain, L = control.lqr(*matrices)[:2] if regulator.Q.any() else (0.0 * regulator.B.T, 0.0 * regulator.A)
+        verify(L, *matrices)
     except (np.linalg.LinAlgError, ParameterError) as error:
         raise InputError(f"no control u = K x is optimal for ever: {error}") from error
+    return L, -gain
 
 
 def by_riccati(regulator: Regulator, x0: Array, t: Array) -> Arc:

@@ -3,6 +3,7 @@ the half-car and the full-car design are."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import product
 
@@ -17,8 +18,8 @@ from fmu_src.road.profiles import RoadParameters
 from fmu_src.vehicle.parameters import Car
 
 from ..methods.polynomials import Array
-from .certified import Certified, Plant, around, certify, growth
-from .full_car import car_plant, full_gain, half_car_plant, strut_gain, varied_values
+from .certified import Certified, Plant, around, certify, growth, state_space
+from .full_car import AXLES, car_plant, full_gain, half_car_plant, strut_gain, varied_values
 from .half_car import Model, come_down, corrected, over_the_bump, printed, printed_control
 from .limit import Approach, approach
 from .margins import Margins, margins
@@ -36,8 +37,8 @@ from .regulator import (
 )
 
 STEP = 1e-3  # s, between two samples of an arc
-SPREAD = 0.3  # of mass and stiffness
-LATTICE = 7  # points of each parameter
+SPREAD = 0.3  # of masses and stiffnesses
+LATTICE = (1.0 - SPREAD, 1.0, 1.0 + SPREAD)  # of each parameter
 WEIGHTS = (1e8, 1e9, 1e10, 1e11, 1e12, 1e13)  # λ [N²/m²]; the default is 1e10
 
 
@@ -82,8 +83,8 @@ class Agreement:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Robustness:
-    """Of u = K x of the infinite horizon on a plant: growth of the closed loop [1/s], nominal and the largest on a
-    lattice over the box of ± SPREAD; margins, if it is stable; what is proved over the box."""
+    """Of u = K x of the infinite horizon on a plant: growth of the closed loop [1/s], nominal and the largest at the
+    corners of the box of ± SPREAD and halfway between them; margins, if it is stable; what is proved over the box."""
 
     growth: float
     worst: float
@@ -114,7 +115,8 @@ class Study:
     agreement: Agreement
     printed: tuple[Solution, ...]
     weighted: tuple[Weighted, ...]
-    lost: float  # λ from which the car with its wheels is unstable
+    lost: float  # λ from which the half-car design makes the car with its wheels unstable
+    lost_in_box: float  # and from which it does so somewhere in the box
 
     @property
     def begin(self) -> float:
@@ -123,7 +125,7 @@ class Study:
 
 
 def study(progress: bool = False) -> Study:
-    """All of it, in about half a minute."""
+    """All of it, in about a minute."""
     car, road = HalfCar(), RoadParameters()
     models = (corrected(car), printed_control(car), printed(car))
     default, *as_printed = (solve(model, car, road) for model in models)
@@ -137,6 +139,7 @@ def study(progress: bool = False) -> Study:
         printed=tuple(as_printed),
         weighted=tuple(weigh(replace(car, lam=lam), road) for lam in weights),
         lost=lost_at(car),
+        lost_in_box=lost_at(car, (1.0 - SPREAD, 1.0 + SPREAD)),
     )
 
 
@@ -182,36 +185,44 @@ def weigh(car: HalfCar, road: RoadParameters) -> Weighted:
         solution=solution,
         approach=approach(solution.regulator),
         half=robustness(half_car_plant(car), K, varied_values(car)),
-        half_on_car=robustness(car_plant(whole), strut_gain(K), varied_values(whole)),
+        half_on_car=robustness(car_plant(whole), strut_gain(K), varied_values(whole), AXLES),
         full_on_car=robustness(car_plant(whole), full_gain(FullCar(car=whole, lam=car.lam)), varied_values(whole)),
     )
 
 
-def robustness(plant: Plant, K: Array, values: dict[str, float]) -> Robustness:
-    """Of u = K x on the plant at these values of its parameters, and in the box of ± SPREAD around them."""
-    A, B = (np.array(matrix, dtype=float) for matrix in plant(values))
+def robustness(
+    plant: Plant, K: Array, values: dict[str, float], signals: Sequence[Sequence[int]] | None = None
+) -> Robustness:
+    """Of u = K x on the plant at these values of its parameters, and in the box of ± SPREAD around them.
+
+    signals : the actuators that one signal commands, see `margins`.
+    """
     nominal = growth(plant, K, values)
-    factors = product(np.linspace(1.0 - SPREAD, 1.0 + SPREAD, LATTICE), repeat=len(values))
-    lattice = (dict(zip(values, np.multiply(f, list(values.values())).tolist(), strict=True)) for f in factors)
+    lattice = (dict(zip(values, np.multiply(f, list(values.values())).tolist(), strict=True))
+               for f in product(LATTICE, repeat=len(values)))  # fmt: skip
     return Robustness(
         growth=nominal,
         worst=max(growth(plant, K, each) for each in lattice),
-        margins=margins(A, B, K) if nominal < 0.0 else None,
+        margins=margins(*state_space(plant, values), K, signals) if nominal < 0.0 else None,
         certified=certify(plant, K, around(values, SPREAD)),
     )
 
 
-def lost_at(car: HalfCar) -> float:
-    """The least λ in `WEIGHTS`' range from which the half car's control makes the car with its wheels unstable;
-    infinite if none does."""
+def lost_at(car: HalfCar, factors: Sequence[float] = (1.0,)) -> float:
+    """The least λ in `WEIGHTS`' range from which the half car's control makes the car with its wheels unstable, with
+    what is varied of it at some of these factors of its value; infinite if none does."""
     plant, whole = car_plant(Car()), varied_values(Car())
+    cars = [
+        dict(zip(whole, np.multiply(f, list(whole.values())).tolist(), strict=True))
+        for f in product(factors, repeat=len(whole))
+    ]
 
     def worst(log_lam: float) -> float:
         _, K = stationary(corrected(car).regulator(replace(car, lam=10.0**log_lam)))
-        return growth(plant, strut_gain(K), whole)
+        return max(growth(plant, strut_gain(K), each) for each in cars)
 
     decades = np.log10(WEIGHTS)
     over = next((k for k, x in enumerate(decades) if worst(x) > 0.0), None)
     if over is None:
         return float("inf")
-    return float(10.0 ** (brentq(worst, decades[over - 1], decades[over], xtol=1e-6) if over else decades[0]))
+    return float(10.0 ** (brentq(worst, decades[over - 1], decades[over], xtol=1e-4) if over else decades[0]))

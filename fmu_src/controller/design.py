@@ -66,8 +66,8 @@ def problem(car: Model) -> tuple[Array, Array, Array, Array, Array]:
 def design(car: Model, *, infinite: bool, span: float | None) -> Design:
     """Solve the Riccati equations of this car: algebraic if `infinite`, backward over `span` [s] if given.
 
-    Raises ImportError where numpy, scipy or (infinite horizon) control are missing, ParameterError, which names all
-    that is not at its default, where there is no design.
+    Raises ImportError where numpy or scipy are missing, ParameterError, which names all that is not at its default,
+    where there is no design.
     """
     import numpy as np
 

@@ -1,20 +1,20 @@
 """What a real car puts between the law and the struts: samples, sensors, limits, lag, valves. All of it off by default.
 
-A sample is taken at the first communication point at or after each multiple of the sample time (at every
-communication point without one) and its forces are held until the next. It is taken when the step to that point is
-made, of the inputs that the host set before this step (for the first, before the end of initialization); reading
-outputs, or a step of no length, takes none. Per sample: sensors and filter, if there are any, make the states that
-the law sees; the forces are cut to the limit. The actuators follow with a lag; those that are semi-active are dampers
-with a valve: they give a force only while it takes energy out of the strut, u Δ̇ ≤ 0, and no more of it than with the
-valve shut, |u| ≤ b_max |Δ̇|. (Without that bound the force would hold a strut still as dry friction does.) That is so
-at communication points: under a force that a master holds over its step a strut may turn, and gets a little.
+A sample is taken at the first communication point at or after each multiple of the sample time (at every communication
+point without one) and its forces are held until the next, or until control ends. It is taken when the step to that
+point is made, of the inputs that the host set before this step (for the first, before the end of initialization);
+reading outputs, or a step of no length, takes none. Per sample: sensors and filter, if there are any, make the states
+that the law sees; the forces are cut to the limit. The actuators follow with a lag; those that are semi-active are
+dampers with a valve: they give a force only while it takes energy out of the strut, u Δ̇ ≤ 0, and no more of it than
+with the valve shut, |u| ≤ b_max |Δ̇|. (Without that bound the force would hold a strut still as dry friction does.) That
+is so at communication points: under a force that a master holds over its step a strut may turn, and gets a little.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, fields
-from math import exp, floor
+from math import exp, floor, inf
 from typing import NamedTuple
 
 from ..quantities import PARAMETERS, Choice, refuse
@@ -89,9 +89,12 @@ class Memory(NamedTuple):
 class Loop:
     """The law behind this hardware. Memory goes in and comes out; nothing is kept here."""
 
-    def __init__(self, hardware: Hardware, law: Law) -> None:
-        """Raises ImportError for an estimate where numpy and scipy are missing, ParameterError where there is none."""
-        self._p, self._law = hardware, law
+    def __init__(self, hardware: Hardware, law: Law, end: float = inf) -> None:
+        """end : time [s] from which the law acts no more.
+
+        Raises ImportError for an estimate where numpy and scipy are missing, ParameterError where there is none.
+        """
+        self._p, self._law, self._end = hardware, law, end
         self._rates = strut_rates(hardware.car)
         self._filter: Filter | None = None
         if hardware.feedback == "estimate":
@@ -108,13 +111,17 @@ class Loop:
         if p.sample_time:
             number = self.number(t)
             if number == m.sample:
-                return m
+                return m if t < self._end - SNAP else self._asked(m, NONE)
         if self._filter:
             acting = self.forces(x, m)
             elapsed = 0.0 if m.sample is None else t - m.time
             estimate = self._filter.updated(estimate, acting, elapsed, self._filter.measured(x, acting, number or 0))
         command = self.command(t, estimate if self._filter else x)
-        return Memory(number, t, command, m.reached if p.actuator_lag else command, estimate)
+        return self._asked(Memory(number, t, m.command, m.reached, estimate), command)
+
+    def _asked(self, m: Memory, command: Forces) -> Memory:
+        """The memory with this command, which actuators without a lag reach at once."""
+        return m._replace(command=command, reached=m.reached if self._p.actuator_lag else command)
 
     def command(self, t: float, x: Sequence[float]) -> Forces:
         """What the law asks for, within the limit [N]."""

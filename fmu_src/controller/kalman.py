@@ -5,6 +5,10 @@ travel. Both are functions of the car's states and of the actuators' forces alon
 road: the controller works them out of its inputs, with the equations of the car, and needs no further wires. So they
 are those of a car with the controller's own parameters, which are to be those of the car.
 
+Their noise by default is that of good sensors of today (0.02 m/s², 0.05 mm, r.m.s.), a choice. Neither sees how high
+the body is over a level road: of heave the estimate knows the rate, and the height only as far as the tyres' forces
+tell. The default sigma_road is a choice too: the larger, the more of what happens is taken for the road.
+
 The filter knows the car linearized at rest, x' = A x + Bu u + Bh h, and takes the road heights h for white noise: anew
 for each sample. Between samples it takes the forces for those that act at the later one: right where they are held, and
 with a lag or a valve, which moves them in between, an error of the model that the sensors correct. Computing it takes

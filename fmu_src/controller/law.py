@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields
-from math import inf
+from math import ceil, inf
 from operator import mul
 from typing import Any
 
@@ -84,6 +84,20 @@ class ControlParameters:
             return None
         wanted = f"wanted at least a step of {step:g} s of control"
         return f"T = {self.T!r} s: {wanted}, got {span:g} s from {self.begin:g} s on"
+
+    def fault_of_start(self, t: float) -> str | None:
+        """Why a run cannot start at t [s]: control is over by then, or no sample would fall into it."""
+        if not self.enabled:
+            return None
+        if self.end <= t + SNAP:
+            return f"T = {self.T!r} s: wanted an end of control after the start of the run at {t:g} s"
+        step, first = self.hardware.sample_time, self.begin
+        if step and t < self.begin - SNAP:  # else the run's first sample, at its start, is one of control
+            first = step * ceil((self.begin - SNAP) / step)
+        if first < self.end - SNAP:
+            return None
+        wanted = f"wanted a sample within the control from {self.begin:g} s on, got the first at {first:g} s"
+        return f"T = {self.T!r} s, sample_time = {step!r} s: {wanted}"
 
 
 REALS = ("T", "t_on", "v0", "Lambda", "tau0", "t_start")

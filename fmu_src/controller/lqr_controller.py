@@ -6,7 +6,7 @@ from math import isfinite
 from pathlib import Path
 from typing import Any, ClassVar
 
-from ..quantities import FORCES, STATES, ParameterError
+from ..quantities import FORCES, STATES, ParameterError, refuse
 from ..slave import Slave, StepError
 from .design import FILE_NAMES, Design, design, stored
 from .hardware import Loop, Memory
@@ -41,7 +41,7 @@ class LqrController(Slave):
         self._loop = None
         if wanted.enabled and not wanted.hardware.ideal:
             try:
-                self._loop = Loop(wanted.hardware, self._law)
+                self._loop = Loop(wanted.hardware, self._law, wanted.end)
             except ImportError as missing:
                 raise _lacking("feedback = 'estimate' needs a filter, whose computation", missing) from missing
 
@@ -61,6 +61,7 @@ class LqrController(Slave):
             ) from missing
 
     def begin(self) -> None:
+        refuse([self._control.fault_of_start(self.time)])
         self._memory = self._looked(self.time, Memory())
 
     def memory(self) -> list[Any]:
@@ -111,7 +112,7 @@ def _memory(data: list[Any]) -> Memory:
 def _lacking(what: str, missing: ImportError) -> ParameterError:
     return ParameterError(
         [
-            f"{what} needs a package that is not installed: {missing.name}. Install 'control' (it brings numpy and "
-            "scipy) into the Python that runs this FMU, or keep the defaults"
+            f"{what} needs a package that is not installed: {missing.name}. Install numpy and scipy into the "
+            "Python that runs this FMU, or keep the defaults"
         ]
     )

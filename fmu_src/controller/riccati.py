@@ -1,6 +1,6 @@
 """Riccati equations of §4: finite horizon (4.7) by backward integration, infinite horizon (remark 4.1).
 
-numpy, scipy and control are imported inside the functions: an FMU that runs on a stored design needs none of them.
+numpy and scipy are imported inside the functions: an FMU that runs on a stored design needs none of them.
 """
 
 from __future__ import annotations
@@ -16,7 +16,8 @@ if TYPE_CHECKING:
     Array = np.ndarray[Any, Any]
 
 RESIDUAL = 1e-9  # of the algebraic equation, over its largest terms
-ROUND_OFF = 1e-12  # of poles, over the largest: closer to the imaginary axis they may lie on either side
+ON_AXIS = 1e-7  # of poles, over the largest: closer to the imaginary axis they may lie on it, where the algebraic
+# equation's solution is right to the root of round-off alone
 
 
 def riccati_rate(L: Array, A: Array, B: Array, Q: Array, R: Array) -> Array:
@@ -55,28 +56,37 @@ def finite_horizon(A: Array, B: Array, Q: Array, R: Array, to_go: Array) -> Arra
 
 
 def infinite_horizon(A: Array, B: Array, Q: Array, R: Array) -> tuple[Array, Array]:
-    """(L, K) of remark 4.1: the stabilizing solution of the algebraic equation, and the gain of u = K x.
+    """(L, K) of remark 4.1: the stabilizing solution of the algebraic equation, and the gain K = −R⁻¹ Bᵀ L of u = K x.
 
-    `control.lqr` returns the gain of u = −K x; the paper's K = −R⁻¹ Bᵀ L has the other sign. Raises LinAlgError or
-    ParameterError where there is no stabilizing solution, or none in double precision.
+    Raises ParameterError where there is no stabilizing solution, or none in double precision.
     """
-    import control
+    import numpy as np
 
-    gain, L = control.lqr(A, B, Q, R)[:2] if Q.any() else (0.0 * B.T, 0.0 * A)
-    _verify(L, A, B, Q, R)
-    return L, -gain
+    L = _stabilizing(A, B, Q, R)
+    verify(L, A, B, Q, R)
+    return L, -np.linalg.solve(R, B.T @ L)
 
 
-def _verify(L: Array, A: Array, B: Array, Q: Array, R: Array) -> Array:
+def _stabilizing(A: Array, B: Array, Q: Array, R: Array) -> Array:
+    import numpy as np
+    from scipy.linalg import solve_continuous_are
+
+    try:
+        return solve_continuous_are(A, B, Q, R) if Q.any() else np.zeros_like(A)
+    except (np.linalg.LinAlgError, ValueError) as error:
+        raise ParameterError([f"the Riccati equation has no stabilizing solution: {error}"]) from error
+
+
+def verify(L: Array, A: Array, B: Array, Q: Array, R: Array) -> Array:
     """Poles (n) of the closed loop with the algebraic equation's solution L.
 
-    Raises ParameterError unless L solves it to round-off and all poles are surely on the left.
+    Raises ParameterError unless L solves it to round-off and all poles are left of what may lie on the axis.
     """
     import numpy as np
 
     S = B @ np.linalg.solve(R, B.T)
     poles = np.linalg.eigvals(A - S @ L)
-    stable = poles.real.max() < -ROUND_OFF * np.abs(poles).max()
+    stable = poles.real.max() < -ON_AXIS * np.abs(poles).max()
     size = np.abs(L @ A).max() + np.abs(L @ S @ L).max() + np.abs(Q).max()
     if not (np.abs(riccati_rate(L, A, B, Q, R)).max() <= RESIDUAL * size and stable):
         raise ParameterError(["the Riccati equation has no stabilizing solution in double precision"])
@@ -104,14 +114,10 @@ def flow(A: Array, B: Array, Q: Array, R: Array) -> tuple[Callable[[Array, Array
     Raises ParameterError where there is no stabilizing solution in double precision.
     """
     import numpy as np
-    from scipy.linalg import expm, solve_continuous_are, solve_continuous_lyapunov
+    from scipy.linalg import expm, solve_continuous_lyapunov
 
-    S, one = B @ np.linalg.solve(R, B.T), np.eye(len(A))
-    try:
-        last = solve_continuous_are(A, B, Q, R) if Q.any() else np.zeros_like(A)
-    except (np.linalg.LinAlgError, ValueError) as error:
-        raise ParameterError([f"the Riccati equation has no stabilizing solution: {error}"]) from error
-    poles, closed = _verify(last, A, B, Q, R), A - S @ last
+    S, one, last = B @ np.linalg.solve(R, B.T), np.eye(len(A)), _stabilizing(A, B, Q, R)
+    poles, closed = verify(last, A, B, Q, R), A - S @ last
     reach = solve_continuous_lyapunov(closed, -S)
 
     def later(L: Array, s: Array) -> Array:

@@ -21,7 +21,7 @@ DRAWINGS: dict[str, Callable[[Any], None]] = {
     "Vehicle7DOF": vehicle_drawing.draw,
     "LqrController": controller_drawing.draw,
 }
-NUMERIC = ("control", "numpy", "scipy")  # what a design for other than default parameters imports
+NUMERIC = ("numpy", "scipy")  # what a design for other than default parameters imports
 LICENSE = Path(__file__).parents[2] / "LICENSE"
 NOTICE = """
 
