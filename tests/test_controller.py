@@ -197,6 +197,8 @@ def test_a_step_longer_than_the_whole_control_is_refused_and_a_shorter_one_is_no
     host = Host(folder)
     assert host.set({"tau0": 0.0, "T": T}) == host.set_string(host.reference["horizon"], horizon) == OK
     assert host.start(0.28) == OK
+    for k in range(round((t - 0.28) / 0.001)):
+        assert host.step(0.28 + 0.001 * k, 0.001) == OK
     assert host.step(t, 0.01) == status
     if status == DISCARD:
         assert "T = 0.302 s: wanted at least a step of 0.01 s of control, got 0.002 s from 0.3 s on" in str(host.log)
