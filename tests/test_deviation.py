@@ -8,13 +8,17 @@ from typing import Any
 import numpy as np
 import pytest
 
-from analysis.bertolino_baksa.adversary import reference_error
+from analysis.bertolino_baksa.adversary import STEP, reference_error, reference_floor
+from analysis.car import car_form, road_signal
+from analysis.certificates.exact_car import energy_norm
 from analysis.errors import InputError
 from analysis.methods.deviation import deviation
 from analysis.methods.linear_response import linear_response
 from analysis.methods.nonlinear_response import nonlinear_response
 from analysis.methods.signals import Signal, constant, harmonic
 from analysis.methods.standard_form import StandardForm, standard_form
+from analysis.reference import road_parameters
+from fmu_src.vehicle.parameters import Car
 
 
 def pendulum(x: Any, w: Any, sine: Any, cosine: Any) -> Sequence[Any]:
@@ -65,3 +69,25 @@ def test_a_motion_that_runs_away_is_refused() -> None:
     form: StandardForm = standard_form(runaway, ["x"], 1)
     with pytest.raises(InputError, match="cannot be integrated in steps of"):
         reference_error(form, constant([0.0]), np.array([1.1]), 5.0, 5e-4)
+
+
+def test_the_floor_is_read_as_often_as_the_fastest_mode_asks() -> None:
+    """Of a car whose tyres' dampers are stiff the error is largest within a fraction of a millisecond of a corner."""
+    car = Car(bp1=1e5, bp2=1e5)
+    form, signal, norm = car_form(car), road_signal(road_parameters({})), energy_norm(car)
+    rest, stop = np.zeros(14), 0.4
+    found = reference_floor(form, signal, [norm], rest, stop)[0]
+    _, e = reference_error(form, signal, rest, stop, 5e-6)
+    finest, coarse = norm(e).max(), norm(reference_error(form, signal, rest, stop, STEP)[1]).max()
+    assert coarse < 0.9 * finest
+    assert found == pytest.approx(finest, rel=2e-3)
+
+
+def test_stiff_tyres_do_not_end_the_iteration_in_their_round_off() -> None:
+    car = Car(cp1=1e8, cp2=1e8)
+    form, signal = car_form(car), road_signal(road_parameters({}))
+    times, e = reference_error(form, signal, np.zeros(14), 0.1, 2e-4)
+    x = nonlinear_response(form, np.zeros(14), signal, times, rtol=1e-13)
+    expected = x - linear_response(form.A, form.B, np.zeros(14), signal, times)
+    norm = energy_norm(car)
+    assert norm(e - expected).max() < 1e-3 * norm(expected).max()

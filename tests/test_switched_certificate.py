@@ -12,15 +12,18 @@ from typing import Any
 import numpy as np
 import pytest
 from flint import arb, arb_mat, fmpq
-from motions_by_time import Motions
+from scipy.linalg import expm
 from test_almost_stable import rehashed
 from test_certificates import certified
 
 from analysis.__main__ import main
 from analysis.bertolino_baksa import switched_certificate
-from analysis.bertolino_baksa.balls import Array, ExactSystem, NotProvedError, precision
+from analysis.bertolino_baksa.balls import Array, ExactSystem, NotProvedError, matrix, precision
+from analysis.bertolino_baksa.cells import carried_on
 from analysis.bertolino_baksa.certificate import opened
-from analysis.bertolino_baksa.norms import euclid, weighted_sup
+from analysis.bertolino_baksa.motions_by_time import Motions
+from analysis.bertolino_baksa.norms import contracting, euclid, weighted_sup
+from analysis.bertolino_baksa.pieces import Piece
 from analysis.bertolino_baksa.switched import Phase, Switched, SwitchedProof, prove, switched
 from analysis.bertolino_baksa.switched_certificate import (
     SwitchedCertificate,
@@ -31,18 +34,17 @@ from analysis.bertolino_baksa.switched_certificate import (
 )
 from analysis.bertolino_baksa.taylor import find_pieces
 from analysis.bertolino_baksa.transition import matrices
-from analysis.car import actuators, car_form, road_signal
 from analysis.certificates import closed_loop_certificate
 from analysis.certificates.car_certificates import car_norms, certify_car
 from analysis.certificates.closed_loop_certificate import infinite_gain
-from analysis.certificates.finite_horizon import build, certify_horizon, certify_table, parts
-from analysis.certificates.horizon_words import reference_floors, statement
+from analysis.certificates.finite_horizon import build, certify_horizon, certify_table
+from analysis.certificates.horizon_words import motions_of, reference_floors, statement
 from analysis.errors import InputError
-from analysis.reference import Parameters, car_of, road_parameters
+from analysis.reference import Parameters
 from analysis.scenario import read_scenario
-from fmu_src.controller.design import Design, design
+from fmu_src.controller.design import design
 from fmu_src.controller.gain_table import GainTable
-from fmu_src.controller.law import control_law, control_parameters
+from fmu_src.controller.law import control_parameters
 
 BUMP = dict(read_scenario("bump-lqr").parameters)
 AT_ONCE: Parameters = {**BUMP, "activation": "at t_on", "t_on": 0.0}
@@ -113,7 +115,7 @@ def test_an_oscillator_whose_damper_comes_and_goes_stays_within_epsilon_and_near
         with precision(2):
             third = claim.largest_delta / 3.0
             epsilon = float(proof.epsilon(claim.norm, np.array([third]))[0])
-        worst = motions.worst(claim.norm, third)
+        worst = motions.worst([claim.norm], [np.array([third])])[0][0]
         assert worst < epsilon < 1.10 * worst
 
 
@@ -218,26 +220,26 @@ def test_corrupted_files_are_rejected_with_and_without_their_hash() -> None:
     assert len(kinds) == 10
 
 
+def test_what_an_earlier_phase_made_leaves_its_chords_no_further_than_is_said() -> None:
+    """e^(As) Φ for a Φ that does not commute with A, whose second derivative is 0 in a row at first."""
+    A = np.array([[-1.0, 1.0], [0.0, -1.0]])
+    start = np.linalg.solve(A @ A, np.array([[0.0, 0.0], [0.0, 1.0]]))
+    with precision(2):
+        metric = contracting(matrix(A), np.diag([1.0, 2.0]))
+        whole = Piece(fmpq(0), fmpq(6), np.zeros((2, 2)), np.zeros((2, 2)))
+        flow, _, _ = carried_on(metric, [whole], matrix(start), 0.0)
+        sizes = flow.sizes(np.eye(2))
+    begin = 0.0
+    for cell, width in enumerate(flow.width.tolist()):
+        s = np.linspace(0.0, width, 60)
+        exact = expm(A * (begin + s)[:, None, None]) @ start
+        chord = exact[0] + (exact[-1] - exact[0]) * (s / width)[:, None, None]
+        assert (np.abs(exact - chord).max(axis=0) <= flow.curve[cell] + 1e-12).all()
+        assert (np.abs(exact).max(axis=0) <= sizes[cell] + 1e-12).all()
+        begin += width
+
+
 # ------------------------------------------------------------------------------------------------ the car
-def motions_of(model: dict[str, Any], stop: float, step: float = 2e-3) -> Motions:
-    """Of the full car, under the controller's own law with the model's table."""
-    parameters, control, table = parts(model)
-    law = control_law(control, Design(control.model, finite=table))
-    car, signal = car_of(parameters), road_signal(road_parameters(parameters))
-    form, Bu = car_form(car, forces=True), actuators(car)
-
-    def inputs(t: float, x: Array) -> Array:
-        w, u = signal(np.array([t])), [force + 0.0 * x[0] for force in law(t, list(x))]
-        return np.concatenate([np.repeat(w, x.shape[1], axis=1), np.stack(u)])
-
-    def linear(t: float, x: Array) -> Array:
-        return np.asarray(form.A @ x + form.B @ inputs(t, x))
-
-    assert np.allclose(form.B[:, 8:], Bu)
-    corners = sorted({*signal.edges, control.begin, control.end})
-    return Motions(lambda t, x: form.rate(x, inputs(t, x)), linear, corners, stop, step)
-
-
 @cache
 def made() -> tuple[SwitchedCertificate, SwitchedProof]:
     return certify_horizon(BUMP, car_norms(BUMP))
@@ -267,7 +269,7 @@ def test_no_start_within_delta_leaves_epsilon_and_the_worst_nearly_do() -> None:
             some = share * claim.largest_delta
             with precision(2):
                 bound = float(proof.epsilon(claim.norm, np.array([some]))[0])
-            worst = near.worst(claim.norm, some)
+            worst = near.worst([claim.norm], [np.array([some])])[0][0]
             assert worst < bound < 1.05 * worst
 
 
@@ -278,7 +280,7 @@ def test_where_the_gain_acts_and_changes_at_once_it_is_as_sharp() -> None:
     delta = certificate.claims[0].largest_delta / 3.0
     with precision(2):
         bound = float(proof.epsilon(energy, np.array([delta]))[0])
-    worst = motions_of(certificate.model, 0.7).worst(energy, delta)
+    worst = motions_of(certificate.model, 0.7).worst([energy], [np.array([delta])])[0][0]
     assert worst < bound < 1.05 * worst
 
 
@@ -306,7 +308,7 @@ def test_the_command_writes_a_file_of_its_own_and_verify_knows_it(
     where = tmp_path / "c.json"
     assert main(["certify", "bump-lqr", "--closed-loop", "-o", str(where)]) == 0
     said = capsys.readouterr().out
-    assert "energy norm: l times 1; largest delta times 1.04" in said and "c.horizon.json: written" in said
+    assert "energy norm: l times 1; largest delta times 1.04" in said and "c.horizon.json, " in said
     assert (tmp_path / "c.horizon.json").read_bytes() == to_json(made()[0])
     assert main(["verify", str(tmp_path / "c.horizon.json")]) == 0
     assert "c.horizon.json: every claim is proved" in capsys.readouterr().out

@@ -18,6 +18,7 @@ from .balls import Array
 from .norms import Norm
 
 STEP = 5e-4  # s, at most
+TURN, MOST = 0.02, 400_000  # rad that the fastest mode turns from time to time, and how many times, at most
 LAST, LAST_OF_ENDLESS = 3.0, 8.0  # times 1/α after the last corner
 CANDIDATES = 64  # starts that the linear part proposes
 SPREAD = 8  # times as many are in the running: the best have neighbours nearly as good
@@ -100,7 +101,9 @@ def excursions(
 
 def reference_floor(form: StandardForm, signal: Signal, norms: Sequence[Norm], x0: Array, stop: float) -> Array:
     """sup N(x − x_lin) (norms,) up to `stop` [s] of the motion from x0 itself, tightly integrated: the true floor."""
-    _, e = reference_error(form, signal, x0, stop, STEP)
+    fastest = float(np.abs(np.linalg.eigvals(form.A)).max())
+    step = min(STEP, max(TURN / fastest, (stop - signal.begin) / MOST))
+    _, e = reference_error(form, signal, x0, stop, step)
     return np.array([norm(e).max() for norm in norms])
 
 
@@ -144,7 +147,7 @@ def _from_its_own_motion(
     peaks = sorted(peaks, key=lambda i: -sizes[i])[:PEAKS]
     M = np.stack([norm.T @ (off[:, i, 1:] - off[:, i, :1]) / small for i in peaks])
     e = np.stack([norm.T @ off[:, i, 0] for i in peaks]) - M @ (norm.T @ at)
-    z, _ = _directions(norm, e, M, delta)
+    z, _ = directions(norm, e, M, delta)
     starts = inverse @ z.T
     return starts * delta / norm(starts)
 
@@ -181,13 +184,13 @@ def furthest_starts(form: StandardForm, norm: Norm, delta: float, times: Array, 
     """Starts (n, count) with N = delta for which N(e + e^(At) y) is largest at the times when it is largest."""
     inverse = np.asarray(np.linalg.inv(norm.T), dtype=float)
     carried = norm.T @ expm((times - times[0])[:, None, None] * form.A) @ inverse
-    z, sizes = _directions(norm, (norm.T @ e).T, carried, delta)
+    z, sizes = directions(norm, (norm.T @ e).T, carried, delta)
     order = np.argsort(sizes)[::-1][: SPREAD * count]
     starts = inverse @ z[order[:: max(1, len(order) // count)][:count]].T
     return np.asarray(starts * delta / norm(starts))
 
 
-def _directions(norm: Norm, e: Array, M: Array, delta: float) -> tuple[Array, Array]:
+def directions(norm: Norm, e: Array, M: Array, delta: float) -> tuple[Array, Array]:
     """z (L, n) that make N(e + M z) large, at each of e (N, n) and M (N, n, n), T left out, and how large it is (L,).
 
     Where the norm is a maximum, the furthest corner for each row and sign; else ascents from the singular vectors.

@@ -133,7 +133,7 @@ def carried_on(metric: Metric, pieces: Sequence[Piece], start: arb_mat, dropped:
     spread = np.array([magnitudes((A_size * arb(w)).exp()) for w in distinct.tolist()])[where]  # ≥ |e^(As)|, 0 ≤ s ≤ Δ
     second = np.abs(rounded(A * A)[0] @ values[:-1])
     second += 1e-9 * second.max()  # its rounding, with much to spare
-    curve = (second @ spread) * (width**2 / 8)[:, None, None] * (1 + 1e-9)
+    curve = (spread @ second) * (width**2 / 8)[:, None, None] * (1 + 1e-9)  # A² e^(As) Φ = e^(As) A² Φ
     return Decay(width, values, curve, off), now, dropped * (1 + 1e-9)
 
 

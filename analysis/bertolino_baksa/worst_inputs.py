@@ -10,7 +10,7 @@ from scipy.optimize import linprog
 from scipy.sparse import diags, vstack
 
 from ..methods.standard_form import StandardForm
-from .adversary import slowest, stepped
+from .adversary import FEW, directions, slowest, stepped
 from .balls import Array
 from .bounded_inputs import Bounds
 from .norms import Norm
@@ -19,6 +19,7 @@ MEMORY = 4.0  # slowest time constants that the worst input is made for
 SAMPLES = 1200  # over them
 TURNS, TURNS_TIED = 12, 3  # of the search for the worst input in a norm
 STARTS = 2  # of it where the inputs are tied
+LAST = (4, 12, 36, 108, 324)  # steps: of the inputs' last parts, under which starts are carried
 
 
 def worst_inputs(form: StandardForm, norm: Norm, bounds: Bounds) -> Array:
@@ -67,10 +68,31 @@ def _ramps(weights: Array, W: Array, step: float) -> Array:
 
 def reached(form: StandardForm, norm: Norm, bounds: Bounds, inputs: Array) -> float:
     """sup N(x) of the motion from rest under inputs that `worst_inputs` made."""
-    step = MEMORY * slowest(form) / SAMPLES
-    x, most, heights = np.zeros((len(form.A), 1)), 0.0, np.arange(inputs.shape[1]) < inputs.shape[1] // 2
+    return _furthest(form, norm, bounds, inputs, np.zeros((len(form.A), 1)))
+
+
+def reached_from(form: StandardForm, norm: Norm, bounds: Bounds, inputs: Array, delta: float) -> float:
+    """sup N(x) over starts at N(x(0)) = delta that the linear part carries furthest together with the inputs' last
+    parts, which are 0 where they must begin at 0."""
+    step, inverse, most = MEMORY * slowest(form) / SAMPLES, np.linalg.inv(norm.T), 0.0
+    for count in LAST:
+        part = inputs[-count - 1 :] * (0.0 if bounds.tied else 1.0)
+        end, flow = np.zeros((len(form.A), 1)), expm(form.A * step)
+        for w in part[:-1]:
+            end = flow @ end + step * (form.B @ w)[:, None]
+        M = norm.T @ expm(form.A * step * count) @ inverse
+        z, sizes = directions(norm, (norm.T @ end).T, M[None], delta)
+        starts = inverse @ z[np.argsort(sizes)[::-1][:FEW]].T
+        most = max(most, _furthest(form, norm, bounds, part, starts * delta / norm(starts)))
+    return most
+
+
+def _furthest(form: StandardForm, norm: Norm, bounds: Bounds, inputs: Array, x: Array) -> float:
+    """sup N(x) of motions from x (n, K) under these inputs."""
+    step, ones = MEMORY * slowest(form) / SAMPLES, np.ones(x.shape[1])
+    most, heights = float(norm(x).max()), np.arange(inputs.shape[1]) < inputs.shape[1] // 2
     for before, after in pairwise(inputs):
         last = np.where(heights & bounds.tied, after, before)
-        x = stepped(form.rate, x, step, *(v[:, None] for v in (before, (before + last) / 2.0, last)))
-        most = max(most, float(norm(x)[0]))
+        x = stepped(form.rate, x, step, *(v[:, None] * ones for v in (before, (before + last) / 2.0, last)))
+        most = max(most, float(norm(x).max()))
     return most

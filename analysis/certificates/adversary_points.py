@@ -11,11 +11,14 @@ from ..bertolino_baksa import rows_adversary
 from ..bertolino_baksa.adversary import long_enough, reached, reference_floor, slowest
 from ..bertolino_baksa.certificate import Certificate, Claim
 from ..bertolino_baksa.rows_certificate import RowsCertificate
+from ..bertolino_baksa.switched_certificate import SwitchedCertificate
 from ..car import car_form, road_signal
 from ..methods.polynomials import Array
 from ..methods.standard_form import StandardForm
 from ..reference import car_of, road_parameters
+from .horizon_words import motions_of, reference_floors
 
+FEW_BY_TIME = 8  # starts for each δ, under a gain by time, where motions take longer
 COUNT = 5  # of an adversary, spread over the table of δ(ε)
 
 
@@ -67,6 +70,17 @@ def row_points(certificate: RowsCertificate) -> list[Points]:
     chosen = [_spread(claim) for claim in certificate.claims]
     deltas = [rows[:, 1] for rows in chosen]
     found = rows_adversary.reached_from(form, norms, certificate.rows, certificate.x0, deltas)
+    return _points(certificate.claims, chosen, found, floors)
+
+
+def horizon_points(certificate: SwitchedCertificate) -> list[Points]:
+    """The same under the gain by time."""
+    norms = [claim.norm for claim in certificate.claims]
+    road = road_signal(road_parameters(certificate.model["parameters"])).edges[-1]
+    stop = road + slowest(car_form(car_of(certificate.model["parameters"])))
+    floors = reference_floors(certificate.model, norms, float(certificate.pieces[-1].end))
+    chosen = [_spread(claim) for claim in certificate.claims]
+    found = motions_of(certificate.model, stop).worst(norms, [rows[:, 1] for rows in chosen], FEW_BY_TIME)
     return _points(certificate.claims, chosen, found, floors)
 
 

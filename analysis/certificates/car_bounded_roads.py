@@ -17,7 +17,7 @@ from ..bertolino_baksa.bounded_certificate import BoundedCertificate, certify, s
 from ..bertolino_baksa.bounded_inputs import Bounds, Driven, Gains, gains
 from ..bertolino_baksa.norms import proved_metric
 from ..bertolino_baksa.search import CLOSE, largest
-from ..bertolino_baksa.worst_inputs import reached, worst_inputs
+from ..bertolino_baksa.worst_inputs import reached, reached_from, worst_inputs
 from ..car import car_form
 from ..errors import InputError
 from ..files import write_whole
@@ -119,12 +119,16 @@ def statement(certificate: BoundedCertificate, driven: Driven) -> list[str]:
         f"  from rest: {named}",
     ]
     for claim in named_by_content(certificate.claims, norms(car_of(parameters), driven.states[:, None])):
-        most = reached(form, claim.norm, bounds, worst_inputs(form, claim.norm, bounds))
+        inputs = worst_inputs(form, claim.norm, bounds)
+        most = reached(form, claim.norm, bounds, inputs)
         refuse_exceeded(claim, most)
-        table = ", ".join(f"{at_most(e)} for {at_least(d)}" for e, d in claim.table[1:].tolist())
+        table = ", ".join(
+            f"{at_most(e)} for {at_least(d)} ({e / max(most, reached_from(form, claim.norm, bounds, inputs, d)):.3g})"
+            for e, d in claim.table[1:].tolist()
+        )
         lines.append(
             f"  {claim.norm.name} norm: l <= {at_most(claim.floor)}, which is eps for delta = "
             f"{at_least(claim.table[0, 1])} (a worst road reaches {most:.4g} from rest: "
-            f"ratio {claim.floor / most:.3g}); eps for larger delta: {table}"
+            f"ratio {claim.floor / most:.3g}); eps for larger delta (over what starts there reach): {table}"
         )
     return [*lines, *model_words(certificate.model, road=False)]

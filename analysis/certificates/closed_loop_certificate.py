@@ -8,6 +8,7 @@ own. All certificates use the passive car's norms.
 from __future__ import annotations
 
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -24,8 +25,10 @@ from ..files import write_whole
 from ..methods.polynomials import Array
 from ..reference import Parameters
 from ..stabilization.full_car import strut_gain
+from .adversary_points import Points, adversary_points, horizon_points
 from .car_certificates import certify_car
 from .certificate_command import statement
+from .certificate_figures import draw_delta
 from .finite_horizon import certify_horizon, refuse_hardware
 from .horizon_words import statement as statement_by_time
 
@@ -58,34 +61,43 @@ def command(parameters: Parameters, where: Path | None) -> int:
     except NotProvedError as error:
         print(f"no certificate: {error}")
         return 1
-    for title, lines in zip(("without control", "with control for all t >= 0"), said, strict=True):
-        print("\n".join([f"{title}:", *lines]))
+    points = [adversary_points(made) for made, _ in (passive, closed)]
+    for title, lines, found in zip(("without control", "with control for all t >= 0"), said, points, strict=True):
+        print("\n".join([f"{title}:", *lines, *(each.words for each in found)]), flush=True)
     print("\n".join(["what control changes, each norm the same for both:", *comparison(passive[0], closed[0])]))
-    lines, by_time = on_horizon(parameters, passive[0])
+    lines, by_time, beside = on_horizon(parameters, passive[0])
     print("\n".join(lines))
     if where is not None:
-        write_whole(where, to_json(closed[0]))
-        print(f"{where}: written")
+        _write(where, to_json(closed[0]), points[1])
     if where is not None and by_time is not None:
-        beside = where.with_suffix(HORIZON)
-        write_whole(beside, horizon_json(by_time))
-        print(f"{beside}: written")
+        _write(where.with_suffix(HORIZON), horizon_json(by_time), beside)
     return 0
 
 
-def on_horizon(parameters: Parameters, passive: Certificate) -> tuple[list[str], SwitchedCertificate | None]:
-    """The certificate with the controller's gain by time on its horizon, in words, against no control; None if none."""
+def _write(where: Path, content: bytes, points: Sequence[Points]) -> None:
+    """The certificate and the figure of its δ(ε)."""
+    write_whole(where, content)
+    write_whole(where.with_suffix(".svg"), draw_delta(points))
+    print(f"{where}, {where.with_suffix('.svg')}: written")
+
+
+def on_horizon(
+    parameters: Parameters, passive: Certificate
+) -> tuple[list[str], SwitchedCertificate | None, list[Points]]:
+    """The certificate with the controller's gain by time on its horizon, in words, against no control, and what an
+    adversary reaches; None and none if there is none."""
     control = control_parameters(parameters)
     if control.horizon != "finite":
-        return ["the controller has no finite horizon: nothing is said of a gain that changes in time"], None
+        return ["the controller has no finite horizon: nothing is said of a gain that changes in time"], None, []
     try:
         made, proof = certify_horizon(parameters, [claim.norm for claim in passive.claims])
         said = statement_by_time(made, proof)
     except NotProvedError as error:
-        return [f"no certificate with the gain by time on its horizon: {error}"], None
+        return [f"no certificate with the gain by time on its horizon: {error}"], None, []
     title = f"with the gain by time from {control.begin:g} to {control.end:g} s and no control before and after:"
     changed = "what the gain by time changes, each norm the same for both:"
-    return [title, *said, changed, *comparison(passive, made)], made
+    points = horizon_points(made)
+    return [title, *said, *(each.words for each in points), changed, *comparison(passive, made)], made, points
 
 
 def comparison(passive: Certificate, closed: Certificate | SwitchedCertificate) -> list[str]:

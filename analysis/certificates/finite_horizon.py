@@ -5,7 +5,7 @@ The table is a part of the model: what is proved is proved of its polynomials, h
 
 from __future__ import annotations
 
-from bisect import bisect_right
+from bisect import bisect_left
 from collections.abc import Callable, Sequence
 from typing import Any
 
@@ -195,7 +195,7 @@ def controlled(
 def _times(A: arb_mat, x: Sequence[Any], B: arb_mat, w: Sequence[Any]) -> list[Any]:
     rates = []
     for row, more in zip(A.tolist(), B.tolist(), strict=True):
-        terms = [v * a for a, v in zip((*row, *more), (*x, *w), strict=True) if a != 0]
+        terms = [v * a for a, v in zip((*row, *more), (*x, *w), strict=True) if not a.is_zero()]  # a ball may hold 0
         rates.append(sum(terms[1:], terms[0]))
     return rates
 
@@ -211,7 +211,7 @@ def _with_gains(
         under = road.inputs_at(at)
         if not begin <= at < end:
             return lambda t: [*under(t), *[arb(0)] * n]
-        i = min(bisect_right(edges, end - at - fmpq(1, 10**12)), len(edges) - 1) - 1  # just after `at`
+        i = min(bisect_left(edges, end - at), len(edges) - 1) - 1  # just after `at`, the time to go is just less
         middle, half = (edges[i + 1] + edges[i]) / 2, (edges[i + 1] - edges[i]) / 2
         settled = end - at > edges[-1]
 

@@ -14,6 +14,7 @@ from fmu_src.controller.design import Design
 from fmu_src.controller.law import DESIGN, control_law
 
 from ..bertolino_baksa.adversary import STEP, long_enough
+from ..bertolino_baksa.motions_by_time import Motions
 from ..bertolino_baksa.norms import Norm
 from ..bertolino_baksa.switched import SwitchedProof
 from ..bertolino_baksa.switched_certificate import SwitchedCertificate
@@ -70,3 +71,20 @@ def reference_floors(model: dict[str, Any], norms: Sequence[Norm], end: float) -
         rows = solve_ivp(rate, (begin, until), y, "DOP853", at, rtol=TIGHT, atol=TIGHT * SMALL).y
         found, y = np.maximum(found, [norm(rows[:14] - rows[14:]).max() for norm in norms]), rows[:, -1]
     return found
+
+
+def motions_of(model: dict[str, Any], stop: float, step: float = 2e-3) -> Motions:
+    """Of the full car from t = 0 to `stop` [s], under the controller's own law with the model's table."""
+    parameters, control, table = parts(model)
+    law = control_law(control, Design(control.model, finite=table))
+    form, signal = car_form(car_of(parameters), forces=True), road_signal(road_parameters(parameters))
+
+    def inputs(t: float, x: Array) -> Array:
+        w, u = signal(np.array([t])), [force + 0.0 * x[0] for force in law(t, list(x))]
+        return np.concatenate([np.repeat(w, x.shape[1], axis=1), np.stack(u)])
+
+    def linear(t: float, x: Array) -> Array:
+        return np.asarray(form.A @ x + form.B @ inputs(t, x))
+
+    corners = sorted({*signal.edges, control.begin, control.end})
+    return Motions(lambda t, x: form.rate(x, inputs(t, x)), linear, corners, stop, step)

@@ -26,7 +26,7 @@ Tubes = Sequence[tuple[Tube, Metric]]
 
 
 def claim_words(claims: Sequence[Claim], reached: Array, start: str) -> list[str]:
-    """l and the largest δ, each l beside what a reference motion reaches (claims,).
+    """l and the largest δ, each l beside what a reference motion reaches (claims,), nan where there is none.
 
     Raises NotProvedError if that exceeds it: no proof says so, but a fault in one would.
     """
@@ -34,7 +34,8 @@ def claim_words(claims: Sequence[Claim], reached: Array, start: str) -> list[str
     for claim, floor in zip(claims, reached.tolist(), strict=True):
         epsilon, delta = claim.table[-1].tolist()
         refuse_exceeded(claim, floor)
-        beside = f"a reference motion reaches {floor:.6g}" + (f": ratio {claim.floor / floor:.4f}" if floor else "")
+        ratio = f": ratio {claim.floor / floor:.4f}" if floor else ""
+        beside = "no reference motion" if np.isnan(floor) else f"a reference motion reaches {floor:.6g}{ratio}"
         lines.append(
             f"  {claim.norm.name} norm: l <= {at_most(claim.floor, 6)} ({beside}); "
             f"delta up to {at_least(delta)}, at eps = {at_most(epsilon)}"

@@ -16,7 +16,13 @@ def add_verbs(verbs: Any, scenario: str) -> None:
     """Add them to the subparsers `verbs`; `scenario` says in words what names one."""
     verb = verbs.add_parser("certify", help="prove that x_lin is almost stable (definition 2.1) on a scenario's road")
     verb.add_argument("scenario", help=f"{scenario}; or a run folder, which then gets its certificate and figures")
-    verb.add_argument("-o", "--out", type=Path, metavar="CERT.json", help="certificate to write; CERT.svg: its figure")
+    verb.add_argument(
+        "-o",
+        "--out",
+        type=Path,
+        metavar="CERT.json",
+        help="certificate to write; CERT.svg: its figure, but with --bounded",
+    )
     kind = verb.add_mutually_exclusive_group()
     kind.add_argument("--quick", action="store_true", help="a coarse floor in about a second, by comparison")
     kind.add_argument("--largest", action="store_true", help="also search the largest amplitude that can be certified")

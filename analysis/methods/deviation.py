@@ -15,7 +15,7 @@ from .standard_form import StandardForm
 
 WINDOW = 1024  # half steps, even: few iterations suffice, and its numbers stay in the cache
 ITERATIONS = 25  # of a window, before it is halved
-CLOSE, ROUND_OFF = 1e-10, 1e-15  # of the last change, over the largest of e and of x
+CLOSE, ROUND_OFF = 1e-10, 1e-15  # of the last change, over the largest of e, and of x and what A does to it in a step
 
 
 def deviation(form: StandardForm, x_lin: Array, w: Array, start: Array, h: float) -> Array:
@@ -54,8 +54,8 @@ def _on_window(form: StandardForm, flow: Array, x_lin: Array, w: Array, start: A
             new[:, ::2] = _chained(twice, np.column_stack([start, step]))
             half = (5.0 * (flow @ first) + 8.0 * middle - back @ last) * (h / 12.0)  # of the parabola through all three
             new[:, 1::2] = flow @ new[:, :-1:2] + half
-            change, size, whole = (np.abs(v).max() for v in (new - e, new, x))
-            if change <= CLOSE * size + ROUND_OFF * whole:
+            change, size, whole, moved = (np.abs(v).max() for v in (new - e, new, x, h * (form.A @ x)))
+            if change <= CLOSE * size + ROUND_OFF * (whole + moved):
                 return new
             e = new
     return None

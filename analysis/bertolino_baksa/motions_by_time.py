@@ -8,9 +8,9 @@ from itertools import pairwise
 
 import numpy as np
 
-from analysis.bertolino_baksa.adversary import SPREAD, _directions
-from analysis.bertolino_baksa.balls import Array
-from analysis.bertolino_baksa.norms import Norm
+from .adversary import SPREAD, directions
+from .balls import Array
+from .norms import Norm
 
 SOME = 10  # steps apart at least are the times at which the linear part is asked
 Rate = Callable[[float, Array], Array]
@@ -45,13 +45,25 @@ class Motions:
         rest = np.zeros((len(starts), 1))
         return self.of(self.full, starts) - self.of(self.linear, rest)
 
-    def worst(self, norm: Norm, delta: float, few: int = 24) -> float:
-        """A large sup N(x − x_lin) over N(x(0)) = delta, by starts that Φ(t, 0) carries furthest from e on."""
-        n, inverse = len(norm.T), np.linalg.inv(norm.T)
+    def worst(self, norms: Sequence[Norm], deltas: Sequence[Array], few: int = 24) -> list[Array]:
+        """For each norm a large sup N(x − x_lin) (K,) over N(x(0)) = its deltas (K,), by starts that Φ(t, 0) carries
+        furthest from e on."""
+        n = len(norms[0].T)
         flow = self.of(self.linear, np.eye(n)) - self.of(self.linear, np.zeros((n, 1)))
-        e, M = self.off(np.zeros((n, 1)))[:, :, 0] @ norm.T.T, norm.T @ flow @ inverse
-        sizes = np.abs(e).max(axis=1) + delta * np.linalg.norm(M, np.inf if norm.largest else 2, axis=(1, 2))
-        some = np.argsort(sizes)[::-1][: SOME * few : SOME]
-        z, reach = _directions(norm, e[some], M[some], delta)
-        starts = inverse @ z[np.argsort(reach)[::-1][: SPREAD * few : SPREAD]].T
-        return float(max(norm(x).max() for x in self.off(starts * delta / norm(starts))))
+        e = self.off(np.zeros((n, 1)))[:, :, 0]
+        pairs = [(norm, delta) for norm, own in zip(norms, deltas, strict=True) for delta in own.tolist()]
+        crowd = [_furthest(norm, delta, e, flow, few) for norm, delta in pairs]
+        off = np.split(self.off(np.concatenate(crowd, axis=1)), np.cumsum([c.shape[1] for c in crowd])[:-1], axis=2)
+        found = np.array([max(norm(x).max() for x in own) for (norm, _), own in zip(pairs, off, strict=True)])
+        return np.split(found, np.cumsum([len(own) for own in deltas])[:-1])
+
+
+def _furthest(norm: Norm, delta: float, e: Array, flow: Array, few: int) -> Array:
+    """Starts (n, few or so) with N = delta for which N(e + Φ y) is largest, at times when that is large; e (N, n)."""
+    inverse = np.linalg.inv(norm.T)
+    near, M = e @ norm.T.T, norm.T @ flow @ inverse
+    sizes = np.abs(near).max(axis=1) + delta * np.linalg.norm(M, np.inf if norm.largest else 2, axis=(1, 2))
+    some = np.argsort(sizes)[::-1][: SOME * few : SOME]
+    z, reach = directions(norm, near[some], M[some], delta)
+    starts = inverse @ z[np.argsort(reach)[::-1][: SPREAD * few : SPREAD]].T
+    return np.asarray(starts * delta / norm(starts))
