@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -11,13 +12,15 @@ from orders import observed_order
 from scipy.integrate import solve_ivp
 
 from analysis import discrepancy
-from analysis.check import _held, check
+from analysis.__main__ import main
+from analysis.certificates.run_certificates import certified_findings
+from analysis.check import LASTS, _held, check, too_short
 from analysis.cosimulation import simulate
 from analysis.discrepancy import linear_states, scales
 from analysis.errors import InputError
 from analysis.methods.linear_response import held_response
 from analysis.scenario import Scenario, read_scenario
-from analysis.trajectory import Run
+from analysis.trajectory import Run, write_run
 from fmu_src.quantities import FORCES, STATES
 from fmu_src.vehicle.linear import linearized
 from fmu_src.vehicle.parameters import Car
@@ -194,3 +197,54 @@ def test_a_single_row_is_no_motion_to_check() -> None:
     row = replace(run.trajectory, time=run.trajectory.time[:1], values=run.trajectory.values[:1])
     with pytest.raises(InputError, match="at least two rows"):
         check(replace(run, trajectory=row))
+
+
+# ---------------------------------------------------------------------------------------------------- short runs
+SHORT = [
+    ("bump", {}),
+    ("sine", {}),
+    ("bump-lqr", {}),
+    ("bump", {"t_start": 0.4}),
+    ("bump", {"bp1": 300.0, "bp2": 300.0}),
+]
+
+
+def ended(name: str, parameters: dict[str, float], after: float, **changes: Any) -> Run:
+    """The run until so long [s] after its road begins."""
+    scenario = read_scenario(name)
+    stop_time = parameters.get("t_start", 0.0) + after
+    return simulate(replace(scenario, stop_time=stop_time, parameters={**scenario.parameters, **parameters}, **changes))
+
+
+@pytest.mark.parametrize(("name", "parameters", "step"), [*((*of, 1e-3) for of in SHORT), ("bump", {}, 5e-4)], ids=str)
+def test_honest_runs_that_last_hold_in_all_findings(name: str, parameters: dict[str, float], step: float) -> None:
+    run = ended(name, parameters, LASTS, step=step)
+    assert too_short(run) == ""
+    assert all(finding.holds for finding in (*check(run), *certified_findings(run)[0]))
+
+
+@pytest.mark.parametrize(("name", "parameters"), SHORT, ids=str)
+def test_shorter_ones_are_said_to_be_short_and_hold_from_when_the_limits_say(
+    name: str, parameters: dict[str, float]
+) -> None:
+    for after in (0.02, 0.052):
+        run = ended(name, parameters, after)
+        assert f"the run ends {after:g} s after rest" in too_short(run)
+        assert all(finding.holds for finding in check(run))
+    assert all(finding.holds for finding in certified_findings(run)[0])
+
+
+def test_the_check_of_a_run_that_is_too_short_says_so(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Its findings fail: the axle has moved by 2e-11 m, and a step's error is a part of that."""
+    (tmp_path / "short").mkdir()
+    write_run(run := ended("bump", {}, 0.002), tmp_path / "short")
+    assert main(["check", str(tmp_path / "short")]) == 1
+    assert "check: the run ends 0.002 s after rest; of honest runs that end before 0.1 s" in capsys.readouterr().err
+    columns = [run.trajectory.time, *run.trajectory.columns(NAMES).T]
+    np.savetxt(tmp_path / "a.csv", np.transpose(columns), delimiter=",", header=",".join(["time", *NAMES]), comments="")
+    main(["check", str(tmp_path / "a.csv"), "--road-class", "exact"])
+    assert "check: the run ends 0.002 s after rest" in capsys.readouterr().err
+
+
+def test_a_run_in_which_nothing_moves_is_not_short() -> None:
+    assert too_short(ended("bump", {"t_start": 0.4}, -0.39)) == ""
