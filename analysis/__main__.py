@@ -218,12 +218,14 @@ def _judge(run: Run, folder: Path) -> int:
     """Check, write findings.json, print a line for each; 0 if all hold, 1 if not."""
     from .certificates.certified_run import definition_findings
     from .certificates.run_certificates import certified_findings
-    from .check import check
+    from .check import check, too_short
     from .findings import Finding, write_findings
     from .run_averaging import averaged_findings
     from .run_series import series_findings
 
     findings = check(run)
+    if short := too_short(run):
+        print(f"check: {short}", file=sys.stderr)
     others: dict[str, Callable[[Run], tuple[list[Finding], str]]] = {
         "averaging": averaged_findings,
         "series": series_findings,

@@ -22,6 +22,7 @@ DEVIATION = {"end": (1e-6, 3), "end, corners within steps": (1e-3, 2), "start": 
 ENERGY = {"end": (1e-7, 4), "end, corners within steps": (1e-5, 2), "start": (2e-3, 2), "start, damped": (1e-2, 1)}
 LOOSEST = 1e-2  # a run that is further off is no motion of this car, however long its steps
 MILLISECOND = 1e-3
+LASTS = 0.1  # s from rest; honest runs that end earlier may fail (tests measure from when on they hold)
 NEEDED = (*STATES, *ROAD_HEIGHTS, *ROAD_RATES, *ROAD_BOWS, *FORCES, *STRUT_TRAVELS)
 
 
@@ -48,6 +49,19 @@ def check(run: Run) -> list[Finding]:
 def lacking(run: Run) -> list[str]:
     """Columns that the checks need and that were not recorded."""
     return [q.name for q in NEEDED if q.name not in run.trajectory.names]
+
+
+def too_short(run: Run) -> str:
+    """Why an honest run may fail, as it ends within LASTS of rest; "" if it does not.
+
+    States that a road or a start has just begun to reach grow by high powers of time: of their maxima, as they are
+    after a few steps, the error of a single step is more than any tolerance.
+    """
+    t, moves = run.trajectory.time, run.trajectory.columns([q.name for q in STATES]).any(axis=1)
+    lasted = float(t[-1] - t[max(0, int(moves.argmax()) - 1)])
+    if not moves.any() or lasted >= LASTS - SNAP:
+        return ""
+    return f"the run ends {lasted:.3g} s after rest; of honest runs that end before {LASTS:g} s some findings may fail"
 
 
 def own_error(run: Run) -> float:

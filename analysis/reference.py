@@ -27,7 +27,8 @@ from .trajectory import Array
 
 Parameters = dict[str, float | str | bool]
 Command = Callable[[float, Sequence[float]], Sequence[float]]
-NUDGE = 1e-10  # s; inputs within a segment are taken this far inside it, on the segment's own side of a corner
+NUDGE = 1.1 * SNAP  # s; inputs of a stretch are taken up to this before its end: asked for a time within SNAP below a
+# corner, roads and laws already answer from behind it, as they should at the start of a stretch
 
 
 def car_of(parameters: Parameters) -> Car:
@@ -97,8 +98,8 @@ def _sampled(loop: Loop, path: Callable[..., Array], y: Array, times: Array, loo
         if len(y) > 14:
             memory = memory._replace(reached=_four(y[14:].tolist()))
         memory = loop.sampled(begin, y[:14].tolist(), memory)
-        if end - begin > NUDGE:
-            within = (times > begin + NUDGE) & (times < end + NUDGE)
+        if end - begin > SNAP:
+            within = (times > begin + SNAP) & (times < end + SNAP)
             at = np.unique(np.array([begin, *times[within].clip(max=end), end]))
             held = memory.command
             rows = path(lambda t, y, held=held: held, [], y, at)
@@ -166,25 +167,39 @@ def in_stretches(
 ) -> Array:
     """States (n, len(x0)) at `times` (n,) [s] of x' = rate(t, x) from x0 at times[0], restarted at each corner [s].
 
-    The rate is asked for times a little inside each stretch, where it has not jumped. Raises InputError where the
-    integration does not come to its end.
+    The rate has jumped at each corner, and not yet NUDGE before it. Raises InputError where the integration does not
+    come to its end.
     """
     from scipy.integrate import solve_ivp  # takes a moment to import
 
-    inner = (t for t in {*corners} if times[0] + NUDGE < t < times[-1] - NUDGE)
+    inner = (t for t in {*corners} if times[0] < t < times[-1])
     edges = [times[0], *sorted(inner), times[-1]]
     states = np.empty((len(times), len(x0)))
     states[0] = x = x0
     tolerances = {"rtol": rtol, "atol": rtol * 1e-3 if atol is None else atol}
     for begin, end in pairwise(edges):
-
-        def inside(t: float, y: Array, first: float = begin + NUDGE, last: float = end - NUDGE) -> Any:
-            return rate(min(max(t, first), last), y)
-
         within = (times > begin) & (times <= end)
         sampled = np.union1d(times[within], end)
-        solution = solve_ivp(inside, (begin, end), x, method=method, t_eval=sampled, **tolerances)
+        solution = solve_ivp(_inside(rate, begin, end), (begin, end), x, method=method, t_eval=sampled, **tolerances)
         if not solution.success:
             raise InputError(f"from t = {begin:g} s the motion cannot be integrated: {solution.message}")
         states[within], x = solution.y.T[: np.count_nonzero(within)], solution.y[:, -1]
     return states
+
+
+def _inside(rate: Callable[[float, Array], Any], begin: float, end: float) -> Callable[[float, Array], Any]:
+    """The rate on one stretch [begin, end]: on its last NUDGE, where the rate may have jumped, the straight line there.
+
+    To hold it there would be a linear error, as an integrator's last stage, at `end`, counts for its whole step.
+    """
+    last, earlier = end - NUDGE, end - 2.0 * NUDGE
+
+    def inside(t: float, y: Array) -> Any:
+        if earlier <= begin:
+            return rate(begin, y)
+        if t <= last:
+            return rate(t, y)
+        at_last, before = np.asarray(rate(last, y)), np.asarray(rate(earlier, y))
+        return at_last + (at_last - before) * ((t - last) / NUDGE)
+
+    return inside

@@ -20,11 +20,14 @@ from scipy.optimize import brentq
 from analysis import __main__ as command_line
 from analysis.audit import (
     amplitude_equation,
+    assumptions,
     averaging,
     car,
     document,
     modal,
     permanent,
+    printed_car,
+    regulator,
     resonance,
     response,
     rows,
@@ -37,6 +40,7 @@ from analysis.audit.differences import CONVENTION, derived_equations, difference
 from analysis.audit.document import Audit
 from analysis.audit.rows import FAILS, INSPECTION, MISPRINT, READING, REFUTED, RIGHT, Evidence, Row
 from analysis.audit.system import Array, derived, planted, printed
+from analysis.derivation import derive
 from analysis.quasilinear import quasilinear
 from fmu_src.vehicle.parameters import Car
 
@@ -57,7 +61,7 @@ EXPECTED = {
     READING: ["§3.4, ε = 0.01", "§4, c1, c2, b1, b2", "§4, φ"],
     RIGHT: [
         *["(2.6), (2.7)", "(3.1)–(3.7)", "(3.1)–(3.7)", "(3.8)", "(3.14)", "(3.15), (3.16)", "(3.17)", "(3.18)"],
-        *["(4.1) with B as printed", "(4.1) C", "remark 4.1"],
+        *["(4.1) C", "(4.3)–(4.7)", "remark 4.1"],
     ],
     REFUTED: ["P_i(t, ξ), B_νij, B_νijk", "§3.4, figures 3, 4"],
     INSPECTION: [
@@ -179,7 +183,6 @@ def test_a_row_without_evidence_is_not_decided_but_by_inspection() -> None:
 def test_power_from_nowhere_is_the_misprints_own_power() -> None:
     """dE/dt changes by −q̇_i (printed − derived), nothing else: signs and sizes of the law's residual."""
     from analysis.audit.system import power_residual
-    from analysis.derivation import derive
 
     d, (q, v, h, dh) = derive(), car.sample()
     for change in differences(CONVENTION):
@@ -281,12 +284,86 @@ def test_the_determinant_of_the_printed_half_car_decides_its_rest() -> None:
     assert sp.simplify(section4.derived()[0].det() - c1 * c2 * (a + b) ** 2 / (J * m)) == 0
 
 
+def test_the_note_on_the_printed_b_has_the_ranks() -> None:
+    """4 for B as printed and corrected, with A corrected and as printed; no row speaks of it, as the paper does not."""
+    note = section4._control_matrix().note
+    assert note.startswith("The paper does not speak of controllability.")
+    assert "for B as printed and for B corrected: with A corrected 4 and 4 (" in note
+    assert "; with A as printed 4 and 4 (" in note
+
+
+def test_another_riccati_equation_would_be_seen(monkeypatch: pytest.MonkeyPatch) -> None:
+    """With its quadratic term twice, or half of Q."""
+    right = regulator.riccati_rate
+    assert regulator.row().holds
+    for wrong in (
+        lambda L, car: right(L, car) + L @ np.array(car.B) @ np.array(car.B).T @ L,
+        lambda L, car: right(L, car) + 0.5 * np.array(car.Q),
+    ):
+        monkeypatch.setattr(regulator, "riccati_rate", wrong)
+        row = regulator.row()
+        assert not row.holds and row.evidence[0].printed > 1e-2
+
+
+def numbered(text: str) -> set[str]:
+    """Numbers of equations in a text, those within a range too."""
+    found = set()
+    for section, first, last in re.findall(r"\((\d)\.(\d+)\)(?:–\(\d\.(\d+)\))?", text):
+        found |= {f"{section}.{n}" for n in range(int(first), int(last or first) + 1)}
+    return found
+
+
+def test_every_numbered_equation_has_a_row_or_is_named_as_without_one(result: Audit) -> None:
+    left_out = numbered(document.HEAD[document.HEAD.index("Without rows:") : document.HEAD.index("which\nassume")])
+    in_rows = set().union(*(numbered(row.equation) for row in result.rows))
+    everything = {f"{section}.{n}" for section, last in ((2, 14), (3, 20), (4, 7)) for n in range(1, last + 1)}
+    assert left_out | in_rows == everything and not left_out & in_rows
+
+
+def test_the_bracket_of_2_13_is_of_order_2_at_rest_and_what_is_added_of_order_1() -> None:
+    """At v = 0, where S_1 is 0: |(∂w/∂v) v'|, which the inequality bounds, and |v' − ε S_1|/ε, which it should."""
+    origin = np.zeros(2)
+    w_v = permanent._derivative(
+        lambda v: permanent.w(permanent.S, lambda _, at: permanent.mean(permanent.S, at), v, permanent.TIME), origin
+    )
+    sizes = [0.04, 0.004, 0.0004]
+    rates = [permanent.right_sides(permanent.TIME, origin, epsilon)[0] for epsilon in sizes]
+    bracket = [float(np.linalg.norm(w_v @ rate)) for rate in rates]
+    added = [permanent.perturbations(origin, epsilon)[0] / epsilon for epsilon in sizes]
+    slopes = [np.polyfit(np.log(sizes), np.log(values), 1)[0] for values in (bracket, added)]
+    assert slopes == [pytest.approx(2.0, abs=0.02), pytest.approx(1.0, abs=0.02)]
+    assert "with ε X⁻¹ (∂S/∂ζ) w, which the bracket lacks, it is of order ε at v = 0" in permanent._small().derived
+
+
 def test_products_of_road_and_coordinates_are_counted() -> None:
     """In the quasi-linear tensors of the derived car there are as many: d_7377 and d_7477."""
     equations = sp.Matrix(derived_equations(CONVENTION))
     counted = [section3.road_products(equations, wheel, 2) for wheel in range(4)]
     d = quasilinear(Car())["d_ijkl"].entries
     assert counted == [sum(index[1] == wheel for index in d) for wheel in range(4)] == [0, 0, 1, 1]
+
+
+def test_the_products_of_road_and_roll_have_the_sign_of_the_convention_that_is_named() -> None:
+    """Third derivatives of ψ̈2 at rest by h21 and ψ2 twice: −2318/(m s²) in A, the opposite in B."""
+    p, values = printed_car, {symbol: getattr(Car(), symbol.name) for symbol in derive().parameters}
+    for convention, sign in (("A", -1), ("B", 1)):
+        left = derived_equations(convention)[6]
+        pull = -left.diff(p.h21) / left.diff(p.ddψ2)
+        value = float((pull.diff(p.ψ2, 2) / 2).subs({p.ψ2: 0, **values}))
+        assert value == pytest.approx(sign * 2318.0, rel=1e-3)
+    assert "d_7377 = −2318, d_7477 = 2318 1/(m s²) (convention A)" in section3._parametric().derived
+
+
+def test_unequal_wheel_masses_couple_in_the_sense_in_which_the_road_drives() -> None:
+    """The left wheel's height falls with ψ2 in convention B, as its tyre's force in the corrected (3.7) says."""
+    p = printed_car
+    slope = -derived_equations(CONVENTION)[6].diff(p.h21) / p.cp2
+    assert sp.simplify(slope + p.s2 * sp.cos(p.ψ2)) == 0
+    T = assumptions._axle_kinetic_energy()
+    assert sp.simplify(T.diff(p.dz2, p.dψ2).diff(p.m21) - slope) == 0
+    row = assumptions._axle_masses()
+    by_hand = "− s2 (m21 − m22) cos ψ2 ψ̈2 + s2 (m21 − m22) sin ψ2 ψ̇2² in (3.4), − s2 (m21 − m22) cos ψ2 z̈2 in (3.7)"
+    assert row.derived.startswith(by_hand) and row.evidence[0].derived < 0.0 and row.holds
 
 
 def test_a_second_rest_would_be_found() -> None:

@@ -152,9 +152,9 @@ seven equations were found by symbolic difference from the Lagrangian of the car
 that decide, each for the printed and for the derived form; of a claim that is refuted, for the printed and for the
 derived system; of what is right if read so, for the nearest reading and for that one. A condition or sentence “does not
 hold” where a formula would be a misprint. What is decided “by inspection” contradicts itself or what stands beside it,
-and has no number. Without rows: (3.9)–(3.12), which define, and (2.8), (2.9), (2.11), (3.19), which assume. Lengths in
-m, angles in rad, SI units throughout; the car is the default one, which is representative of its class and not the
-paper's.
+and has no number. Without rows: (2.1)–(2.4), (3.9)–(3.12), (4.2), which define, and (2.8), (2.9), (2.11), (3.19), which
+assume. Lengths in m, angles in rad, SI units throughout; the car is the default one, which is representative of its
+class and not the paper's.
 """
 
 

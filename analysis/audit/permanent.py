@@ -110,7 +110,10 @@ def perturbations(v: Array, epsilon: float) -> tuple[float, float, float]:
 
 
 def _small() -> Row:
-    """|v' − ε S_1|/ε, which the inequality bounds: next to v = 0 it does not shrink with v any more, but with ε."""
+    """|v' − ε S_1|/ε, of which the inequality bounds a part: next to v = 0 it shrinks with ε, not any more with v.
+
+    What does not is ε X⁻¹ (∂S/∂ζ) w, which the print lacks; the bracket, corrected, is of order ε² at v = 0.
+    """
 
     def size(scale: float, epsilon: float) -> float:
         return perturbations(scale * START, epsilon)[0] / epsilon
@@ -119,7 +122,8 @@ def _small() -> Row:
     return Row(
         equation="between (2.13) and (2.14)",
         printed="‖(∂w/∂v) [ε S_1 + O(v)]‖ < Δ if ‖v‖ < δ",
-        derived="< Δ if ‖v‖ < δ and ε is small: at v = 0 it is of order ε, not 0",
+        derived="what (2.13) adds to ε S_1, over ε, is < Δ if ‖v‖ < δ and ε is small: with ε X⁻¹ (∂S/∂ζ) w, which the "
+        "bracket lacks, it is of order ε at v = 0, not 0",
         kind=FAILS,
         evidence=[
             Evidence(

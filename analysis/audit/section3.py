@@ -153,8 +153,8 @@ def _parametric() -> Row:
     return Row(
         equation="P_i(t, ξ), B_νij, B_νijk",
         printed="ε Σ B_νij ξ_j sin νΩt + ε Σ B_νijk ξ_j ξ_k sin νΩt for the front left wheel",
-        derived=f"only h q q, only in the row of {', '.join(sorted(own))}: {', '.join(named)} 1/(m s²); for a front "
-        "wheel P = 0",
+        derived=f"only h q q, only in the row of {', '.join(sorted(own))}: {', '.join(named)} 1/(m s²) (convention A); "
+        "for a front wheel P = 0",
         kind=REFUTED,
         evidence=[
             count(

@@ -13,6 +13,7 @@ from fmu_src.controller.halfcar import HalfCar
 
 from ..figures import readable
 from ..methods.polynomials import Array
+from . import regulator
 from .differences import plain
 from .rows import RIGHT, Evidence, Row
 
@@ -52,7 +53,7 @@ def derived() -> tuple[sp.Matrix, sp.Matrix, sp.Matrix]:
 
 def rows() -> list[Row]:
     """§4 in the order of the paper."""
-    return [_state_matrix(), _control_matrix(), _controllability(), _excitation(), _gain()]
+    return [_state_matrix(), _control_matrix(), _excitation(), regulator.row(), _gain()]
 
 
 def changes(printed: sp.Matrix, right: sp.Matrix) -> list[tuple[int, int]]:
@@ -174,33 +175,22 @@ def _control_matrix() -> Row:
                 apart=1.0,
             ),
         ],
+        note=_reached(),
     )
 
 
-def _controllability() -> Row:
+def _reached() -> str:
     """Not lost with the second control: one force still reaches heave and pitch, as their frequencies differ."""
-    A, B, _ = derived()
-    ranks = []
-    for state, which in ((A, "corrected"), (A_PRINTED, "as printed")):
-        (rank, least), (rank_corrected, least_corrected) = reach(state, B_PRINTED, 4), reach(state, B, 4)
-        ranks.append(
-            Evidence(
-                measure=f"rank of [B AB A²B A³B] by exact fractions, A {which}, B as printed and corrected (least "
-                f"singular value over the largest: {readable(least, 2)}, {readable(least_corrected, 2)})",
-                printed=float(rank),
-                derived=float(rank_corrected),
-                unit="1",
-                expected=4.0,
-                tolerance=0.0,
-                apart=1.0,
-            )
+    said = []
+    for state, which in ((derived()[0], "corrected"), (A_PRINTED, "as printed")):
+        (rank, least), (rank_corrected, least_corrected) = reach(state, B_PRINTED, 4), reach(state, derived()[1], 4)
+        said.append(
+            f"with A {which} {rank} and {rank_corrected} (least singular value over the largest: "
+            f"{readable(least, 2)} and {readable(least_corrected, 2)})"
         )
-    return Row(
-        equation="(4.1) with B as printed",
-        printed="controllable",
-        derived="controllable: what B as printed loses is strength, not rank",
-        kind=RIGHT,
-        evidence=ranks,
+    return (
+        "The paper does not speak of controllability. Rank of [B AB A²B A³B] by exact fractions, for B as printed and "
+        f"for B corrected: {'; '.join(said)}. What B as printed loses is strength, not rank."
     )
 
 

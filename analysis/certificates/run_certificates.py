@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -15,7 +16,7 @@ from ..bertolino_baksa.input_rows import RowClass
 from ..bertolino_baksa.norms import proved_metric
 from ..bertolino_baksa.sampled import Samples
 from ..car import car_form, road_signal
-from ..check import own_error
+from ..check import own_error, too_short
 from ..discrepancy import scales
 from ..errors import InputError
 from ..findings import Finding, write_findings
@@ -143,6 +144,8 @@ def judge_export(path: Path, road_class: str | None, scenario: str | None) -> in
     roads = None if road_class == "exact" else read_class(road_class)
     run, rounding = read_export(path, _as_exported(scenario or DEFAULT))
     findings, reason = certified_findings(run, rounding, str(path), roads)
+    if short := too_short(run):
+        print(f"check: {short}", file=sys.stderr)
     if reason:
         print(f"{'not all' if findings else 'nothing'} is proved: {reason}")
     for finding in findings:
