@@ -47,6 +47,14 @@ def test_neither_is_hardware_once_it_acts(hardware: dict[str, Any]) -> None:
     assert reason == "" and before and all(f.holds for f in before)
 
 
+@pytest.mark.parametrize("stop", [0.25, 0.32])
+def test_a_run_that_ends_on_a_corner_of_the_road_under_tyres_with_dampers_is_honest(stop: float) -> None:
+    """Its last row's accelerations are those of the road's rate behind the corner."""
+    run = run_of("bump", stop_time=stop, parameters={"bp1": 300.0, "bp2": 300.0})
+    findings, reason = certified_findings(run)
+    assert reason == "" and all(f.holds for f in findings), [f.line for f in findings]
+
+
 @pytest.mark.parametrize(("sampling", "least"), [("end", 100.0), ("start", 2.0)])
 def test_a_damper_one_per_cent_off_is_falsified_however_the_fmus_were_coupled(sampling: str, least: float) -> None:
     coupling = {"end": "gauss-seidel", "start": "jacobi"}[sampling]

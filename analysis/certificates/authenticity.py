@@ -39,6 +39,7 @@ class KnownRoad:
     peak: Array  # (cells, 8)
     mean: Array  # (cells, 8)
     smooth: Array  # (cells,), False for cells with a corner of the road inside, which no quintic can follow
+    after: Array  # (8,), just after the last row
 
 
 def profile(signal: Signal, corners: Sequence[float], times: Array) -> KnownRoad:
@@ -52,15 +53,15 @@ def profile(signal: Signal, corners: Sequence[float], times: Array) -> KnownRoad
     smooth = np.ones(cells, dtype=bool)
     for corner in corners:
         smooth &= (corner < times[:-1] + SNAP) | (corner > times[1:] - SNAP)
-    none = np.zeros((cells, 8))
-    return KnownRoad(ends.transpose(1, 2, 0), at_nodes.swapaxes(0, 1), none, none, smooth)
+    none, after = np.zeros((cells, 8)), signal(times[-1] + INSIDE * steps[-1])[:, 0]
+    return KnownRoad(ends.transpose(1, 2, 0), at_nodes.swapaxes(0, 1), none, none, smooth, after)
 
 
 def sampled(rows: Samples) -> KnownRoad:
     """A road whose heights are known at the rows."""
     left, right = rows.inputs[:, 0, :, None], rows.inputs[:, 1, :, None]
     nodes = left + (right - left) * (1.0 + NODES) / 2.0
-    return KnownRoad(rows.inputs, nodes, rows.peak, rows.mean, np.ones(len(nodes), dtype=bool))
+    return KnownRoad(rows.inputs, nodes, rows.peak, rows.mean, np.ones(len(nodes), dtype=bool), right[-1, :, 0])
 
 
 @dataclass(frozen=True, slots=True)
@@ -93,11 +94,12 @@ def defect(car: Car, road: KnownRoad, export: Export) -> Defect:
     rates = _accelerations(car, ends, road.ends.swapaxes(1, 2))
     found = quintics(export.times, x, rates.swapaxes(1, 2))
     sizes = np.abs(_accelerations(car, found.values, road.nodes) - found.slopes[:, 7:]).max(axis=2)
-    allowed = MISSED * _fourth_differences(rates[:, :, 0]) + GROWS * export.own * scales(rates[:, :, 0])
+    last = _accelerations(car, x[-1:, :, None], road.after[None, :, None])[:, :, 0]
+    behind = np.concatenate([rates[:, :, 0], last])  # at corners, of the road behind them
+    allowed = MISSED * _fourth_differences(rates[:, :, 0]) + GROWS * export.own * scales(behind)
     allowed += _digits(car, found.half, export.digits) + _open(car, road)
     if export.accelerations is not None and export.their_digits is not None:
-        after = np.concatenate([rates[1:, :, 0], rates[-1:, :, 1]])  # at corners, of either side
-        wrong = [np.abs(export.accelerations[1:] - side) for side in (rates[:, :, 1], after)]
+        wrong = [np.abs(export.accelerations[1:] - side) for side in (rates[:, :, 1], behind[1:])]
         sizes = np.maximum(sizes, np.min(wrong, axis=0))
         allowed += export.their_digits[1:]
     ratio = np.where(road.smooth[:, None], sizes / allowed, 0.0)
