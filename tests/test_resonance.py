@@ -17,14 +17,15 @@ from analysis.__main__ import main
 from analysis.car import car_form, road_signal
 from analysis.errors import InputError
 from analysis.methods.linear_response import periodic_response
-from analysis.methods.modes import modes
+from analysis.methods.modes import Modes, modes
 from analysis.methods.resonance import Resonance, Resonances, largest_forced, remark_as_printed, resonances
 from analysis.methods.series import exact_series
 from analysis.methods.signals import constant, harmonic
 from analysis.methods.standard_form import StandardForm, standard_form
 from analysis.reference import Parameters
-from analysis.scans import resonance_scan
+from analysis.scans import resonance_scan, resonance_words
 from analysis.scans.car_scans import VARIATIONS, variation
+from analysis.scans.meetings import meetings
 from analysis.scans.resonance_scan import scan
 from fmu_src.quantities import PARAMETERS
 from fmu_src.road.profiles import RoadParameters
@@ -213,7 +214,7 @@ def test_a_car_whose_modes_creep_has_an_empty_table() -> None:
     creeping: Parameters = {"b1": 2e6, "b2": 2e6, "bp1": 2e6, "bp2": 2e6}
     table = resonance_scan.table_of(creeping)
     assert table.silent == 7 and not table.rows
-    assert "Modes that do not oscillate: 7" in "\n".join(resonance_scan.lines(table, creeping))
+    assert "Modes that do not oscillate: 7" in "\n".join(resonance_words.lines(table, creeping))
     with pytest.raises(InputError, match="wanted two modes that oscillate"):
         scan(creeping, "Jy", points=2)
 
@@ -236,9 +237,46 @@ def test_a_scan_says_where_frequencies_meet_whatever_its_points_and_ranks_what_i
     assert str(resonance_scan.crossings(result)[0].row) == "β7 = Ω"
     assert all(road for _, road in result.changing)
     assert all(row.road for attribute in ("relative", "relative_distance") for row in result.nearest(attribute))
-    said = "\n".join(resonance_scan.scan_lines(result))
+    said = "\n".join(resonance_words.scan_lines(result))
     assert "β7 = Ω at 12.75, gain" in said and "β5 = β6" not in said
     assert "nearest is nearest in frequency" not in said and said.count("nearest is nearest with damping") == 1
+
+
+@pytest.mark.parametrize("points", [4, 9])
+@pytest.mark.parametrize(
+    ("name", "pairs"), [("Jy", {(1, 2): 1269.0, (4, 5): 1643.9}), ("c2/c1", {(0, 1): 0.6295, (1, 2): 0.7604})]
+)
+def test_a_scan_finds_where_two_modes_meet_whatever_its_points(
+    name: str, pairs: dict[tuple[int, int], float], points: int
+) -> None:
+    """Their numbers by rising β say nothing of it: there β_k − β_j has a kink, and its sign is kept."""
+    result = scan({"profile": "bump"}, name, points=points)
+    assert {meeting.before: meeting.value for meeting in result.meetings} == pytest.approx(pairs, rel=2e-4)
+    for meeting in result.meetings:
+        (j, k), varied = meeting.before, variation(name)
+        gaps = [
+            np.diff(resonance_scan.modes_of(varied.changed({}, value)).beta[[j, k]])[0]
+            for value in (0.999 * meeting.value, meeting.value, 1.001 * meeting.value)
+        ]
+        assert gaps[1] < 1e-4 * min(gaps[0], gaps[2])
+    j, k = min(pairs)
+    strongest = resonance_scan.crossings(result)[0]
+    assert str(strongest.row) == f"β{j + 1} = β{k + 1}" and strongest.value == pytest.approx(pairs[j, k], rel=2e-4)
+    assert f"the strongest: {strongest}" in "\n".join(resonance_words.scan_lines(result))
+
+
+@pytest.mark.parametrize(("coupling", "meet"), [(0.0, [1.0]), (0.003, [])], ids=["meet", "veer"])
+def test_modes_that_only_turn_into_each_other_do_not_meet(coupling: float, meet: list[float]) -> None:
+    """x and y of the frequencies 1 and v, coupled by a spring: over a step of 0.2 they look as if they had."""
+
+    def modes_at(v: float) -> Modes:
+        C = np.array([[1.0, coupling], [coupling, v**2]])
+        return modes(np.block([[np.zeros((2, 2)), np.eye(2)], [-C, -0.01 * np.eye(2)]]))
+
+    wide = np.array([0.85, 1.05])
+    likeness = np.abs(modes_at(0.85).K_inverse[:2] @ modes_at(1.05).K[:, :2])
+    assert likeness.argmax(axis=1).tolist() == [1, 0]
+    assert [meeting.value for meeting in meetings(modes_at, wide)] == pytest.approx(meet, abs=1e-9)
 
 
 def test_the_command_prints_and_writes(

@@ -25,7 +25,7 @@ from ..parallel import mapped
 from ..reference import Parameters, car_of
 from ..scenario import read_scenario
 from .car_scans import VARIATIONS, higher_road, system_of, variation
-from .resonance_scan import as_csv, output_folder
+from .tables import as_csv, output_folder
 
 SPAN, SAMPLES = 5.0, 501  # s from rest, and times in it
 RTOL = 1e-9  # of the full equations; Φ's share is seen down to about this
