@@ -52,8 +52,8 @@ class Scan:
         return [min(rows, key=lambda row: getattr(row, attribute)) for rows in among]
 
     def strongest(self) -> list[Resonance]:
-        """The one with the largest gain at each value."""
-        return [max(table.values(), key=lambda row: row.gain) for table in self.tables]
+        """The one with the largest gain near resonance at each value."""
+        return [max(table.values(), key=lambda row: row.near_gain) for table in self.tables]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -198,19 +198,19 @@ def _numbers(row: Resonance) -> list[float]:
 
 
 def _rows(rows: Sequence[Resonance]) -> list[list[Any]]:
-    heads = ["equality", *NUMBERS, "coefficient [1/s]", "gain", "in remark 3.2"]
-    return [heads, *([str(r), *_numbers(r), r.coefficient, r.gain, r.in_print] for r in rows)]
+    heads = ["equality", *NUMBERS, "coefficient [1/s]", "gain", "gain near resonance", "in remark 3.2"]
+    return [heads, *([str(r), *_numbers(r), r.coefficient, r.gain, r.near_gain, r.in_print] for r in rows)]
 
 
 def _scan_rows(result: Scan) -> list[list[Any]]:
     heads = [f"{result.name} [{result.variation.unit}]"]
     for words in ("in frequency", "with damping"):
         heads += [f"nearest {words}", *(f"{what}, {words}" for what in NUMBERS)]
-    heads += ["strongest", "gain"]
+    heads += ["strongest near resonance", "gain near resonance"]
     rows = []
     for i, value in enumerate(result.values.tolist()):
         pair = result.nearest("relative")[i], result.nearest("relative_distance")[i]
         strongest = result.strongest()[i]
         rows.append([value, *(x for r in pair for x in (str(r), *_numbers(r)))])
-        rows[-1] += [str(strongest), strongest.gain]
+        rows[-1] += [str(strongest), strongest.near_gain]
     return [heads, *rows]

@@ -6,7 +6,7 @@ import numpy as np
 
 from ..methods.floquet import period_of
 from ..methods.modes import Modes, modes
-from ..methods.resonance import SMALL, Resonance, Resonances, remark_as_printed
+from ..methods.resonance import NEAR, SMALL, Resonance, Resonances, remark_as_printed
 from ..methods.series import exact_series
 from ..methods.signals import Piece, Signal, constant
 from ..methods.standard_form import StandardForm
@@ -49,8 +49,7 @@ def lines(table: Resonances, parameters: Parameters) -> list[str]:
     text.append(
         f"nearest with damping: {nearest}, {nearest.distance:.3g} 1/s ({nearest.relative_distance:.2g} relative)"
     )
-    strongest = max(occurring, key=lambda row: row.gain)
-    text.append(f"strongest: {strongest} adds {strongest.gain:.2g} of a motion of {table.size:.2g} (m, rad)")
+    text += strength_lines(table)
     text += secular_lines(form, found, piece)
     three, four = remark_as_printed(found.eigenvalues)
     for name, remark in (("three", three), ("four", four)):
@@ -59,6 +58,23 @@ def lines(table: Resonances, parameters: Parameters) -> list[str]:
             f"remark 3.2 as printed, {name} modes ({len(remark.distance)}): nearest in frequency "
             f"{remark.detuning[i]:.3g} rad/s at {remark.indices[i].tolist()}, in the complex plane "
             f"{remark.distance[j]:.3g} 1/s at {remark.indices[j].tolist()}"
+        )
+    return text
+
+
+def strength_lines(table: Resonances) -> list[str]:
+    """What the strongest combination near resonance adds, and what one far off does, if that is more."""
+    strongest = max(table.occurring, key=lambda row: row.near_gain)
+    text = [f"near resonance: off by less than {NEAR:g} of the largest frequency, or than the damping; "]
+    text[0] += (
+        f"strongest of these: {strongest} adds {strongest.near_gain:.2g} of a motion of {table.size:.2g} (m, rad)"
+        if strongest.near_gain > 0.0
+        else "there is none"
+    )
+    largest = max(table.occurring, key=lambda row: row.gain)
+    if largest.gain > largest.near_gain:
+        text.append(
+            f"off resonance, merely forced: {largest}, {largest.detuning:.3g} rad/s off, adds {largest.gain:.2g} of it"
         )
     return text
 
@@ -85,9 +101,11 @@ def _line(row: Resonance) -> str:
 
 def scan_lines(result: Scan) -> list[str]:
     """Where the nearest resonance is nearest and where farthest."""
-    gains = [row.gain for row in result.strongest()]
+    leading = result.strongest()
+    gains = [row.near_gain for row in leading]
     text = [
-        f"{result.name} = {result.values[i]:.4g} {result.variation.unit}: the strongest adds {what}, {gains[i]:.2g}"
+        f"{result.name} = {result.values[i]:.4g} {result.variation.unit}: the strongest near resonance, {leading[i]}, "
+        f"adds {what}, {gains[i]:.2g}"
         for i, what in ((int(np.argmax(gains)), "most"), (int(np.argmin(gains)), "least"))
     ]
     span = f"{result.name} from {result.values[0]:.4g} to {result.values[-1]:.4g} {result.variation.unit}"
