@@ -14,7 +14,7 @@ from .car import car_form, road_signal
 from .check import own_error
 from .errors import InputError
 from .findings import Finding
-from .methods.amplitudes import LEFT_OUT, left_out, stability
+from .methods.amplitudes import LEFT_OUT, UNDAMPED, left_out, stability
 from .methods.averaging import AmplitudeEquations, average, slow
 from .methods.modes import Complex, Modes, modes
 from .methods.polynomials import Array
@@ -26,7 +26,6 @@ from .trajectory import Run
 
 FEWEST = 10  # rows after the road's last edge
 MOST_ROWS, BLOCK = 20_000, 200  # that are compared, from the first of them; that are held at a time
-UNDAMPED = 1e-12  # of |λ|: decay rates as small as this are round-off
 DEGREE = 3  # of Φ: what a relative error of its arguments is multiplied with
 
 
