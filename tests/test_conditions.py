@@ -22,7 +22,7 @@ from analysis.car import car_form, road_signal
 from analysis.certificates import car_amplitudes as car_amplitudes_module
 from analysis.certificates.car_amplitudes import amplitude_lines, car_amplitudes
 from analysis.certificates.car_conditions import car_verdicts
-from analysis.methods.amplitudes import LEFT_OUT, Stability, stability
+from analysis.methods.amplitudes import LEFT_OUT, Stability, decided
 from analysis.methods.averaging import AmplitudeEquations, average
 from analysis.methods.floquet import floquet
 from analysis.methods.modes import modes
@@ -174,7 +174,7 @@ def test_a_decay_that_is_round_off_beside_a_mode_that_grows_leaves_it_unstable()
         ["x", "y", "x'", "y'"],
         1,
     )
-    found = stability(average(form))
+    found = decided(average(form))
     assert by_averaging(found).number == pytest.approx(0.1) and not by_averaging(found).holds
 
 
@@ -213,9 +213,9 @@ def test_the_forced_motion_is_told_apart_from_amplitudes_that_are_the_formulas()
 
 def test_an_amplitude_that_does_not_exist_is_beyond_no_reach(monkeypatch: pytest.MonkeyPatch) -> None:
     def none_critical(equations: AmplitudeEquations) -> Stability:
-        return replace(stability(equations), critical_amplitude=np.full(14, np.inf))
+        return replace(decided(equations), critical_amplitude=np.full(14, np.inf))
 
-    monkeypatch.setattr(car_amplitudes_module, "stability", none_critical)
+    monkeypatch.setattr(car_amplitudes_module, "decided", none_critical)
     text = "\n".join(amplitude_lines({"profile": "bump"}, None))
     assert text.count(" inf ") == 7 and "*" not in text
 

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
-from ..methods.amplitudes import Stability, stability
+from ..methods.amplitudes import Stability, decided
 from ..methods.averaging import average, slow
 from ..methods.modal_polynomials import exponents, modal_parts, waves
 from ..methods.modes import Complex, modes
@@ -120,7 +120,7 @@ def conditions(form: StandardForm, piece: Piece | None, prove: Callable[[], Proo
     found = modes(form.A)
     growth, equations = growth_of(form, piece), average(form, piece, found=found, detuning=slow(found))
     try:
-        averaged: Stability | InputError = stability(equations)
+        averaged: Stability | InputError = decided(equations)
     except InputError as error:  # C0 and C3 do not need it
         averaged = error
     linear = float(equations.linear.real.max())

@@ -8,7 +8,7 @@ import numpy as np
 
 from ..car import car_form
 from ..errors import InputError
-from ..methods.amplitudes import LEFT_OUT, SIZES, Equilibrium, Stability, equilibria, left_out, stability
+from ..methods.amplitudes import LEFT_OUT, SIZES, Equilibrium, Stability, decided, equilibria, left_out
 from ..methods.averaging import AmplitudeEquations, average, slow
 from ..methods.modes import Complex, Modes, modes
 from ..methods.polynomials import Array
@@ -48,7 +48,7 @@ def car_amplitudes(parameters: Parameters, piece: Piece | None) -> Amplitudes:
         B=(equations.linear - A)[:half],
         second=average(form, piece, found=m, order=2).linear[:half],
         own=np.diag(equations.cubic[:half]),
-        condition=stability(average(form, piece, found=m, detuning=slow(m))),
+        condition=decided(average(form, piece, found=m, detuning=slow(m))),
         resting=tuple((found, _left_out(equations, found)) for found in equilibria(equations)),
     )
 

@@ -63,8 +63,7 @@ class Stability:
 def stability(equations: AmplitudeEquations) -> Stability:
     """The condition with its margins.
 
-    Raises InputError where it does not decide: a resonance forces an amplitude, or couples some too strongly, or what
-    is left of a decay is round-off.
+    Raises InputError where it does not decide: a resonance forces an amplitude, or couples some too strongly.
     """
     _not_forced(equations)
     (plain, sizes), alpha, own = _linear_by_waves(equations), equations.modes.alpha, equations.cubic.real
@@ -77,9 +76,6 @@ def stability(equations: AmplitudeEquations) -> Stability:
             f"condition after (3.20): wanted s_{k + 1}' to have no linear term but s_{k + 1}, or small ones, got "
             f"{', '.join(coupled)}: modes of equal frequency (or that do not oscillate), or near a resonance"
         )
-    least = UNDAMPED * np.abs(equations.modes.eigenvalues)
-    if np.all(growth <= least) and np.any(growth >= -least):
-        raise InputError("condition after (3.20): wanted damped modes, got one whose decay is round-off")
     half = own.shape[1]
     return Stability(
         growth=growth,
@@ -89,6 +85,17 @@ def stability(equations: AmplitudeEquations) -> Stability:
         valid_scale=_valid_scale(equations),
         valid_amplitudes=np.array([_valid_amplitude(equations, k) for k in range(len(growth))]),
     )
+
+
+def decided(equations: AmplitudeEquations) -> Stability:
+    """The condition with its margins, where the sign of each is more than round-off.
+
+    Raises InputError where it does not decide, or where no mode grows and what is left of a decay is round-off.
+    """
+    found, least = stability(equations), UNDAMPED * np.abs(equations.modes.eigenvalues)
+    if np.all(found.growth <= least) and np.any(found.growth >= -least):
+        raise InputError("condition after (3.20): wanted damped modes, got one whose decay is round-off")
+    return found
 
 
 def left_out(equations: AmplitudeEquations, s: Complex) -> float:
