@@ -54,7 +54,8 @@ def _curves(scan: Scan, attribute: str, words: str) -> Panel:
         ax.semilogy(scan.values, values, color=GREY, linestyle="-", linewidth=3.0, alpha=0.5, label=what)
         for key, color in zip(_leading(scan, attribute), COLOURS, strict=False):
             row = next(table[key] for table in scan.tables if key in table)
-            ax.semilogy(scan.values, scan.curve(key, attribute), color=color, linestyle="-", label=str(row))
+            curve = scan.curve(key, attribute)
+            ax.semilogy(scan.values, np.where(curve > 0.0, curve, np.nan), color=color, linestyle="-", label=str(row))
         top = max(values) or 1.0
         ax.set_ylim(*((1e-3 * top, 2.0 * top) if gain else (0.5 * min(values), 1.0)))
         ax.set_ylabel(words)
