@@ -20,8 +20,8 @@ from .methods.spatial import Transfer, UndampedModes, transfer
 from .reference import car_of
 from .run_figures import ENERGIES, FOLDER
 from .run_series import MOST_ROWS, series_terms
-from .scans.resonance_scan import as_csv
 from .scans.spatial_scan import car_modes, said
+from .scans.tables import as_csv
 from .trajectory import Run, read_run
 
 TABLE = "modal-energies.csv"

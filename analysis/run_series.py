@@ -81,11 +81,16 @@ def series_terms(run: Run, t: Array, x0: Array, order: int) -> tuple[Array, floa
 
 
 def _radius(ratio: float, run: Run) -> str:
-    """Within which ε, and within which motions, terms get smaller: ε stands for the square of a motion's size."""
+    """Within which ε, and within which motions, terms get smaller: ε stands for the square of a motion's size.
+
+    With the road's height where that alone makes the motion: from rest, under no forces.
+    """
     if ratio == 0.0:
         return "no terms but the linear one"
     times = ratio**-0.5
-    road = f", A = {times * run.reals('A')[0]:.3g} m" if run.parameters.get("profile") in HIGH_AS_A else ""
+    states, forces = (run.trajectory.columns([q.name for q in table]) for table in (STATES, FORCES))
+    alone = run.parameters.get("profile") in HIGH_AS_A and not states[0].any() and not forces.any()
+    road = f", A = {times * run.reals('A')[0]:.3g} m" if alone else ""
     return (
         f"factor between the terms {ratio:.2g}, so practical radius ε < {1.0 / ratio:.3g}: motions up to {times:.3g} "
         f"times this one{road}"

@@ -6,6 +6,7 @@ That C1 agrees with exact Floquet exponents to the order A⁴ is tested in test_
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -14,19 +15,20 @@ from flint import fmpq
 from test_almost_stable import OMEGA, PERIOD, build, certified, duffing, quiet
 
 from analysis.bertolino_baksa.balls import NotProvedError
-from analysis.bertolino_baksa.conditions import Verdict, conditions, growth_of
+from analysis.bertolino_baksa.conditions import Verdict, by_averaging, by_normal_form, conditions, growth_of
 from analysis.bertolino_baksa.norms import proved_metric
 from analysis.bertolino_baksa.proof import Proof, prove
 from analysis.car import car_form, road_signal
+from analysis.certificates import car_amplitudes as car_amplitudes_module
 from analysis.certificates.car_amplitudes import amplitude_lines, car_amplitudes
 from analysis.certificates.car_conditions import car_verdicts
-from analysis.methods.amplitudes import LEFT_OUT
-from analysis.methods.averaging import average
+from analysis.methods.amplitudes import LEFT_OUT, Stability, decided
+from analysis.methods.averaging import AmplitudeEquations, average
 from analysis.methods.floquet import floquet
 from analysis.methods.modes import modes
 from analysis.methods.signals import Piece, harmonic
 from analysis.methods.standard_form import standard_form
-from analysis.reference import Parameters, road_parameters
+from analysis.reference import Parameters, car_of, road_parameters
 from analysis.scenario import read_scenario
 from fmu_src.vehicle.parameters import Car
 
@@ -132,14 +134,95 @@ def test_the_amplitudes_table_says_where_there_is_none() -> None:
     assert "not for this car and road" in line
 
 
-def test_near_a_resonance_averaging_reaches_further_than_its_small_divisors() -> None:
-    """Where the road all but meets mode 7: the term is kept, not divided by the detuning."""
+def unproved_verdicts(parameters: Parameters) -> tuple[Verdict, ...]:
+    """Without the proof of C3, which takes long."""
 
     def unproved() -> Proof:
         raise NotProvedError("left out here")
 
-    parameters: Parameters = {"profile": "sine", "A": 0.01, "Lambda": 1.0, "v0": 12.75404, "tau0": 0.02}
     piece = road_signal(road_parameters(parameters)).pieces[-1]
-    C1 = conditions(car_form(Car(), order=3), piece, unproved)[1]
+    return conditions(car_form(car_of(parameters), order=3), piece if piece.amplitudes.any() else None, unproved)
+
+
+MEETING: Parameters = {"profile": "sine", "Lambda": 1.0, "v0": 12.75404, "tau0": 0.02}  # Ω = β7
+
+
+@pytest.mark.parametrize(
+    ("parameters", "why"),
+    [
+        ({**MEETING, "A": 0.4}, "small ones, got s_3 in s_2'"),
+        ({**MEETING, "v0": 10.0, "A": 0.4, "b1": 12000.0, "b2": 12000.0}, "modes of equal frequency"),
+        ({"profile": "bump", "b1": 0.0, "b2": 0.0}, "wanted damped modes, got one whose decay is round-off"),
+        ({**MEETING, "v0": 10.0, "A": 0.01, "b1": 0.0, "b2": 0.0}, "wanted damped modes"),
+    ],
+    ids=["the road meets a mode", "creeping", "undamped", "undamped on a road"],
+)
+def test_where_averaging_does_not_decide_the_others_still_speak(parameters: Parameters, why: str) -> None:
+    C0, C1, C2, C3 = unproved_verdicts(parameters)
+    assert "monomials of X^-1 S" in C0.reason and C3.reason == "not proved: left out here"
+    assert not C1.holds and np.isnan(C1.number) and C1.reason.startswith("not decided: ") and why in C1.reason
+    assert not C2.holds and 0.0 < C2.number < 1.0 and C2.reason.endswith("; decay of what stays not decided, as in C1")
+    piece = road_signal(road_parameters(parameters)).pieces[-1]
+    (line,) = amplitude_lines(parameters, piece if piece.amplitudes.any() else None)
+    assert line.startswith("(3.20) mode by mode: not for this car and road: ") and why in line
+
+
+def test_a_decay_that_is_round_off_beside_a_mode_that_grows_leaves_it_unstable() -> None:
+    """x'' + 4 x = 0 beside van der Pol's oscillator."""
+    form = standard_form(
+        lambda z, w, s, c: [z[2], z[3], -z[0] + z[2] * 0.2 - z[0] * z[0] * z[2] * 0.2 + w[0], z[1] * -4.0],
+        ["x", "y", "x'", "y'"],
+        1,
+    )
+    found = decided(average(form))
+    assert by_averaging(found).number == pytest.approx(0.1) and not by_averaging(found).holds
+
+
+def test_a_margin_less_the_sizes_of_what_nearly_resonates_says_so() -> None:
+    parameters: Parameters = {**MEETING, "v0": 12.754, "A": 0.03}
+    piece = road_signal(road_parameters(parameters)).pieces[-1]
+    found = car_amplitudes(parameters, piece)
+    plain = found.modes.alpha[:7] + (found.A + found.B).real
+    np.testing.assert_allclose(found.condition.growth[:7] - found.condition.sizes[:7], plain, rtol=1e-9)
+    assert plain[6] == pytest.approx(-16.828, abs=1e-3) and found.condition.growth[6] == pytest.approx(-16.72, abs=1e-3)
+    lines = amplitude_lines(parameters, piece)
+    rows = [next(line for line in lines if line.startswith(f"   {k} ")).split() for k in range(1, 8)]
+    assert [row[4].endswith("~") for row in rows] == [False, True, True, False, True, True, True]
+    assert float(rows[6][4][:-1]) == pytest.approx(16.72, abs=1e-4) and "   ~ less the sizes of what nearly" in lines[9]
+    C1 = by_averaging(found.condition)  # mode 1 decides, which nothing resonates with
+    assert "resonates" not in C1.reason and C1.number == pytest.approx(plain[0])
+    slow = replace(found.condition, growth=found.condition.growth * np.where(np.arange(14) % 7 == 6, 1e-2, 1.0))
+    assert "B_k), its margin less the sizes of what nearly resonates, not lost" in by_averaging(slow).reason
+    C2 = by_normal_form(growth_of(car_form(Car(), order=3), piece), slow)
+    assert C2.reason.endswith("decay of what stays 0.1672 1/s, less the sizes of what nearly resonates")
+
+
+def test_the_forced_motion_is_told_apart_from_amplitudes_that_are_the_formulas() -> None:
+    """At A = 0.4 m averaging leaves out too much of both."""
+
+    def resting(A: float) -> list[str]:
+        parameters: Parameters = {**MEETING, "v0": 10.0, "A": A}
+        return amplitude_lines(parameters, road_signal(road_parameters(parameters)).pieces[-1])[-2:]
+
+    rest, others = resting(0.4)
+    assert rest.startswith("s = 0, the forced motion: beyond the reach of averaging, which leaves out 0.28 of it")
+    assert others.startswith("19 more solve the equations where averaging ends, the smallest with |s_7| = 0.91")
+    rest, others = resting(0.03)
+    assert rest.startswith("constant amplitudes s = 0: stable, slowest change -2.08") and others.startswith("20 more")
+
+
+def test_an_amplitude_that_does_not_exist_is_beyond_no_reach(monkeypatch: pytest.MonkeyPatch) -> None:
+    def none_critical(equations: AmplitudeEquations) -> Stability:
+        return replace(decided(equations), critical_amplitude=np.full(14, np.inf))
+
+    monkeypatch.setattr(car_amplitudes_module, "decided", none_critical)
+    text = "\n".join(amplitude_lines({"profile": "bump"}, None))
+    assert text.count(" inf ") == 7 and "*" not in text
+
+
+def test_near_a_resonance_averaging_reaches_further_than_its_small_divisors() -> None:
+    """Where the road all but meets mode 7: the term is kept, not divided by the detuning."""
+
+    C1 = unproved_verdicts({**MEETING, "A": 0.01})[1]
     height = float(C1.reason.split("not lost up to ")[1].split(" times")[0])
     assert C1.holds and 5.0 < height < 20.0

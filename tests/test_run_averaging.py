@@ -125,17 +125,29 @@ def test_the_resonances_of_a_run_are_those_of_its_size() -> None:
     small, large = (findings_of(standard("bump", A))[REMARK] for A in (0.01, 0.1))
     assert large.measured == pytest.approx(100.0 * small.measured, rel=0.1)
     assert 1e-6 < small.measured < 1e-3
-    rows = resonances(car_form(Car(), order=3)).occurring
+    rows = resonances(car_form(Car(), order=3), size=0.01).occurring
     damped = min(rows, key=lambda row: row.relative_distance)
-    assert f"strongest {max(rows, key=lambda row: row.gain)}; nearest in frequency {rows[0]}, " in small.source
+    near, largest = (max(rows, key=lambda row: getattr(row, name)) for name in ("near_gain", "gain"))
+    assert str(near) == "β1 = β3" and str(largest) == "β2 = β6" and largest.relative > 0.8
+    said = (
+        f"strongest near resonance {near}; off resonance too a term adds to a large motion: most {largest}, 64.3 rad/s"
+    )
+    assert said in small.source and f"; nearest in frequency {rows[0]}, " in small.source
     assert f"; nearest with damping {damped}, " in small.source
+
+
+def test_a_motion_that_is_merely_large_is_in_no_resonance() -> None:
+    """Off by 64 of 73 rad/s, β2 = β6 adds more than 0.1 to the motion on a bump of 0.8 m; what is near adds less."""
+    remark = findings_of(run_of({**BUMP, "A": 0.8}, end=0.8))[REMARK]
+    assert remark.holds and 0.04 < remark.measured < 0.09
+    assert float(remark.source.split("most β2 = β6, 64.3 rad/s off, ")[1].split(";")[0]) > 0.1
 
 
 def test_where_the_road_meets_a_mode_it_is_named_and_averaging_still_applies() -> None:
     found, reason = averaged_findings(standard("sine", 0.01, 12.75404))
     assert not reason and len(found) == 3 and all(finding.holds for finding in found)
     remark = found[0]
-    assert "strongest β7 = Ω; nearest in frequency β7 = Ω, " in remark.source
+    assert "strongest near resonance β7 = Ω; nearest in frequency β7 = Ω, " in remark.source
     assert remark.measured < 2e-3
     nearest = float(remark.source.split("nearest in frequency β7 = Ω, ")[1].split()[0])
     assert nearest < 1e-3

@@ -74,6 +74,25 @@ def test_the_practical_radius_is_said_and_what_the_run_is_too_coarse_to_show() -
     assert [blind in f.source for f in series_findings(simulated(A=0.1))[0]] == [False, False, True]
 
 
+@pytest.mark.parametrize(
+    ("parameters", "named"),
+    [
+        ({"A": 0.001}, True),
+        ({"A": 0.0, "body.heave": 0.02}, False),
+        ({"A": 0.001, "body.heave": 0.02, "body.roll": 0.05}, False),
+        ({"A": 0.01, "activation": "at t_on", "t_on": 0.1}, False),
+    ],
+    ids=["bump", "start alone", "start and bump", "forces and bump"],
+)
+def test_a_height_of_the_road_is_named_only_where_the_road_alone_makes_the_motion(
+    parameters: dict[str, Any], named: bool
+) -> None:
+    """A start or a force does not grow with A: times as high a road is not times as large a motion."""
+    run = simulated("bump-lqr" if "activation" in parameters else "bump", **parameters)
+    source = series_findings(run)[0][0].source
+    assert "times this one" in source and (" times this one, A = " in source) == named
+
+
 def test_a_motion_of_another_car_is_not_that_of_the_series() -> None:
     run = simulated(A=0.05)
     Jx = run.reals("Jx")[0] * 1.001

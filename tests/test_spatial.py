@@ -22,7 +22,7 @@ from analysis.errors import InputError
 from analysis.methods.linear_response import linear_response
 from analysis.methods.nonlinear_response import nonlinear_response
 from analysis.methods.signals import constant, harmonic
-from analysis.methods.spatial import Transfer, transfer, undamped_modes
+from analysis.methods.spatial import UNDRIVEN, Transfer, transfer, undamped_modes
 from analysis.methods.standard_form import StandardForm, standard_form
 from analysis.reference import Parameters
 from analysis.run_energies import energies_of
@@ -86,7 +86,7 @@ def test_the_indicator_shows_what_the_textbook_calls_saturation(ratio: float, mo
         assert found.nonlinear[1 - driven] > found.nonlinear[driven]
         assert found.moved > 0.15  # measured: 0.19, and off resonance 0.0000
     else:
-        assert max(found.moved, found.largest_gain, found.undriven_share) < 1e-3
+        assert max(found.moved, found.largest_gain, found.undriven_gain) < 1e-3
 
 
 def test_a_mode_that_takes_its_energy_from_the_drive_is_not_missed() -> None:
@@ -103,17 +103,22 @@ def test_a_mode_that_takes_its_energy_from_the_drive_is_not_missed() -> None:
     late = t > 200.0
     found = transfer(undamped_modes(np.eye(2), np.diag([4.0, 1.0])), t[late], linear[:, late], full[:, late])
     assert found.moved < 1e-3  # x loses nothing
-    assert found.largest_gain > 1.0 and found.undriven_share == pytest.approx(found.largest_gain, rel=1e-6)
+    assert found.largest_gain > 1.0 and found.undriven_gain == pytest.approx(found.largest_gain, rel=1e-6)
 
 
 def test_only_what_some_modes_lose_and_others_gain_counts() -> None:
     gaining = Transfer(linear=np.array([1.0, 1.0]), nonlinear=np.array([1.5, 1.2]))
-    assert (gaining.moved, gaining.largest_gain, gaining.undriven_share) == (0.0, 0.25, 0.0)
+    assert (gaining.moved, gaining.largest_gain, gaining.undriven_gain) == (0.0, 0.25, 0.0)
     losing = Transfer(linear=np.array([1.0, 1.0]), nonlinear=np.array([0.5, 1.2]))
     assert losing.moved == losing.largest_gain == pytest.approx(0.1)
     assert Transfer(linear=np.array([1.0, 1.0]), nonlinear=np.array([0.5, 0.9])).largest_gain == 0.0
     hidden = Transfer(linear=np.array([9.99, 0.005, 0.005]), nonlinear=np.array([9.0, 0.1, 0.02]))
-    assert hidden.undriven_share == pytest.approx(0.01)
+    assert hidden.undriven_gain == pytest.approx(0.0095)  # of (0.1 - 0.005)/10 and (0.02 - 0.005)/10
+    losing_too = Transfer(linear=np.array([9.995, 0.005]), nonlinear=np.array([11.0, 0.004]))
+    assert losing_too.undriven_gain == 0.0 and losing_too.largest_gain > 0.1
+    assert "where Φ adds most to an undriven mode: nowhere" in "\n".join(
+        spatial_scan.most_lines([Point(values={"speed": 1.0}, transfer=losing_too)])
+    )
 
 
 def test_a_linear_car_spreads_the_energy_of_one_wheel_and_phi_changes_it_by_the_square_of_the_road() -> None:
@@ -128,6 +133,21 @@ def test_a_linear_car_spreads_the_energy_of_one_wheel_and_phi_changes_it_by_the_
     slope, bend = observed_order(change, [4.0, 2.0, 1.0])
     assert slope == pytest.approx(2.0, abs=0.05) and bend < 0.03
     assert change(1.0) < 1e-3
+
+
+def test_what_phi_adds_to_an_undriven_mode_grows_with_the_square_of_the_road() -> None:
+    """Mode 7 has 6e-4 of the energy in the linear motion already, on a road of any height: no doing of Φ."""
+    parameters = read_scenario("fourier-fl").parameters
+
+    def gain(factor: float) -> float:
+        road = higher_road(parameters, factor)
+        found = transfer(car_modes(Car()), *motions(road, rtol=1e-11))
+        assert 5e-4 < found.linear[6] / found.linear.sum() < UNDRIVEN
+        return found.undriven_gain
+
+    slope, bend = observed_order(gain, [16.0, 8.0, 4.0])
+    assert slope == pytest.approx(2.0, abs=0.05) and bend < 0.03
+    assert gain(4.0) < 1e-7
 
 
 def test_the_command_finds_the_worst_point_and_shows_the_car_there(
@@ -155,6 +175,14 @@ def test_the_command_finds_the_worst_point_and_shows_the_car_there(
     words = ", ".join(f"{name} = {value:.4g}" for name, value in values.items())
     assert f"worst of 12, by the largest gain of one mode: {words}; on the edge of the grid in " in said
     assert "\n".join(spatial_scan.lines(there, "there")[1:]) in said
+    for column, words in (
+        ("moved between modes [1]", "moves most between modes"),
+        ("largest gain of an undriven mode [1]", "adds most to an undriven mode"),
+    ):
+        most = max(rows, key=lambda row: float(row[column]))
+        assert min(float(row[column]) for row in rows) < 0.1 * float(most[column])
+        at = ", ".join(f"{name} = {float(most[name]):.4g}" for name in VARIATIONS if most[name])
+        assert f"where Φ {words}: {at}: {float(most[column]):.3g}\n" in said
     twice = transfer_of(higher_road(there, 2.0)).largest_gain
     assert f"on the road 2 times as high: largest gain of one mode {twice:.3g} " in said
     assert twice == pytest.approx(4.0 * max(gains), rel=0.02)

@@ -12,7 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..methods.amplitudes import Stability, stability
+from ..errors import InputError
+from ..methods.amplitudes import Stability, decided
 from ..methods.averaging import average, slow
 from ..methods.modal_polynomials import exponents, modal_parts, waves
 from ..methods.modes import Complex, modes
@@ -82,7 +83,7 @@ class Growth:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Verdict:
-    """A condition's name, whether it holds, its number [1/s] (C3: 1) and what the number says."""
+    """A condition's name, whether it holds, its number [1/s] (C3: 1; nan: not decided) and what the number says."""
 
     name: str
     holds: bool
@@ -118,7 +119,11 @@ def conditions(form: StandardForm, piece: Piece | None, prove: Callable[[], Proo
     """
     found = modes(form.A)
     growth, equations = growth_of(form, piece), average(form, piece, found=found, detuning=slow(found))
-    averaged, linear = stability(equations), float(equations.linear.real.max())
+    try:
+        averaged: Stability | InputError = decided(equations)
+    except InputError as error:  # C0 and C3 do not need it
+        averaged = error
+    linear = float(equations.linear.real.max())
     return as_printed(growth, linear), by_averaging(averaged), by_normal_form(growth, averaged), by_proof(prove)
 
 
@@ -146,14 +151,17 @@ def as_printed(growth: Growth, linear: float) -> Verdict:
     return Verdict(name="C0", holds=linear < 0.0, number=linear, reason=f"{counts}; v = 0 of v' = S_1(v) is {said}")
 
 
-def by_averaging(averaged: Stability) -> Verdict:
+def by_averaging(averaged: Stability | InputError) -> Verdict:
     """Only exp(iβt) is taken out: Re(α_k + A_k + B_k) < 0, the Floquet exponents' real parts to the order of A²."""
+    if isinstance(averaged, InputError):
+        return Verdict(name="C1", holds=False, number=np.nan, reason=f"not decided: {averaged}")
     most = -averaged.margin
-    reason = f"largest Re(alpha_k + A_k + B_k), {averaged.lost}"
+    words = f", its margin {averaged.words}" if averaged.words else ""
+    reason = f"largest Re(alpha_k + A_k + B_k){words}, {averaged.lost}"
     return Verdict(name="C1", holds=most < 0.0, number=most, reason=reason)
 
 
-def by_normal_form(growth: Growth, averaged: Stability) -> Verdict:
+def by_normal_form(growth: Growth, averaged: Stability | InputError) -> Verdict:
     """All with σ ≠ 0 is taken out, integrated from 0 where Re σ < 0, from infinity where Re σ > 0: no small damping.
 
     What is left has the linear part λ_k + A_k + B_k, unless modes are coupled by monomials linear in v with σ = 0.
@@ -161,7 +169,11 @@ def by_normal_form(growth: Growth, averaged: Stability) -> Verdict:
     stay, coupled = int(np.count_nonzero(growth.resonant)), growth.coupled
     reason = f"smallest |sigma| != 0, so w is bounded; {stay} monomials have sigma = 0 and stay"
     reason += f", {len(coupled)} of them couple modes, as {growth.named(coupled[0])}" if coupled else ""
-    reason += f"; decay of what stays {averaged.margin:.4g} 1/s"
+    if isinstance(averaged, InputError):
+        reason += "; decay of what stays not decided, as in C1"
+        return Verdict(name="C2", holds=False, number=growth.nearest, reason=reason)
+    words = f", {averaged.words}" if averaged.words else ""
+    reason += f"; decay of what stays {averaged.margin:.4g} 1/s{words}"
     return Verdict(name="C2", holds=averaged.margin > 0.0 and not coupled, number=growth.nearest, reason=reason)
 
 

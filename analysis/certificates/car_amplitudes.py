@@ -8,7 +8,7 @@ import numpy as np
 
 from ..car import car_form
 from ..errors import InputError
-from ..methods.amplitudes import LEFT_OUT, Equilibrium, Stability, equilibria, left_out, stability
+from ..methods.amplitudes import LEFT_OUT, SIZES, Equilibrium, Stability, decided, equilibria, left_out
 from ..methods.averaging import AmplitudeEquations, average, slow
 from ..methods.modes import Complex, Modes, modes
 from ..methods.polynomials import Array
@@ -48,7 +48,7 @@ def car_amplitudes(parameters: Parameters, piece: Piece | None) -> Amplitudes:
         B=(equations.linear - A)[:half],
         second=average(form, piece, found=m, order=2).linear[:half],
         own=np.diag(equations.cubic[:half]),
-        condition=stability(average(form, piece, found=m, detuning=slow(m))),
+        condition=decided(average(form, piece, found=m, detuning=slow(m))),
         resting=tuple((found, _left_out(equations, found)) for found in equilibria(equations)),
     )
 
@@ -76,29 +76,34 @@ def amplitude_lines(parameters: Parameters, piece: Piece | None) -> list[str]:
     margins: Array = -condition.growth[:half]
     for k in range(half):
         critical, reach = condition.critical_amplitude[k], condition.valid_amplitudes[k]
-        mark = " " if critical <= reach else "*"
+        mark, less = "*" if reach < critical < np.inf else " ", "~" if condition.sizes[k] > 0.0 else " "
         text.append(
             f"{k + 1:>4}{found.modes.alpha[k]:>11.4f}{found.A[k].real:>12.3g}{found.B[k].real:>12.3g}"
-            f"{margins[k]:>10.4f}{found.second[k].real:>11.3g}{found.own[k].real:>12.3g}"
+            f"{margins[k]:>10.4f}{less}{found.second[k].real:>10.3g}{found.own[k].real:>12.3g}"
             f"{critical:>15.3g}{mark}{reach:>13.3g}"
         )
-    if np.any(condition.critical_amplitude[:half] > condition.valid_amplitudes[:half]):
+    if np.any(condition.sizes[:half] > 0.0):
+        text.append(f"   ~ {SIZES}")
+    beyond = condition.critical_amplitude[:half] > condition.valid_amplitudes[:half]
+    if np.any(beyond & np.isfinite(condition.critical_amplitude[:half])):
         text.append("   * beyond the reach of averaging: a number of the formula's, not of the car's")
     return [*text, f"the condition, with the road's height: {condition.lost}", *_resting(found)]
 
 
 def _resting(found: Amplitudes) -> list[str]:
-    """Constant amplitudes, those that averaging reaches by name."""
+    """Constant amplitudes, rest first, of the others those that averaging reaches by name."""
     text = []
     for each, out in found.resting:
+        moving = np.flatnonzero(each.amplitudes)
+        what = ", ".join(f"|s_{k + 1}| = {each.amplitudes[k]:.3g}" for k in moving) or "s = 0"
         if out <= LEFT_OUT:
-            moving = np.flatnonzero(each.amplitudes)
-            what = ", ".join(f"|s_{k + 1}| = {each.amplitudes[k]:.3g}" for k in moving) or "s = 0"
             text.append(
                 f"constant amplitudes {what}: {'stable' if each.stable else 'not stable'}, slowest change "
                 f"{each.growth.real.max():.4g} 1/s"
             )
-    if beyond := [each for each, out in found.resting if out > LEFT_OUT]:
+        elif not len(moving):
+            text.append(f"s = 0, the forced motion: beyond the reach of averaging, which leaves out {out:.2g} of it")
+    if beyond := [each for each, out in found.resting if out > LEFT_OUT and each.amplitudes.any()]:
         nearest = min(beyond, key=lambda each: float(each.amplitudes.max()))
         k = int(np.argmax(nearest.amplitudes))
         text.append(

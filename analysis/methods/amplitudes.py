@@ -12,8 +12,10 @@ from .averaging import AmplitudeEquations
 from .modes import Complex
 from .polynomials import Array
 
+SIZES = "less the sizes of what nearly resonates"  # of a margin that they are taken from
 MOST_MODES = 12  # whose subsets are tried
 LEFT_OUT = 0.1  # of a motion, that averaging may leave out and still describe it
+UNDAMPED = 1e-12  # of |λ|: decay rates as small as this are round-off
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -22,6 +24,7 @@ class Stability:
 
     growth            : the left-hand side [1/s]; where s_k' is linear in other s_j too (modes of equal frequency, a
                         resonance near by) with the sizes of those terms added: it bounds the growth of max |s_k|.
+    sizes             : what of it are those sizes [1/s]; 0 where it is Re(α_k + ε(A_k + B_k)) itself.
     critical_scale    : factor on the input at which it becomes 0; inf if it never does.
     critical_amplitude: |s_k| at which the mode's own cubic term cancels its decay; inf if it never does.
     valid_scale       : factor on the input up to which averaging leaves out at most LEFT_OUT of a small free motion
@@ -30,6 +33,7 @@ class Stability:
     """
 
     growth: Array
+    sizes: Array
     critical_scale: Array
     critical_amplitude: Array
     valid_scale: float
@@ -39,6 +43,11 @@ class Stability:
     def margin(self) -> float:
         """Smallest decay rate [1/s]; the condition holds if > 0."""
         return float(-self.growth.max())
+
+    @property
+    def words(self) -> str:
+        """What is added to the margin, if anything."""
+        return SIZES if self.sizes[int(np.argmax(self.growth))] > 0.0 else ""
 
     @property
     def lost(self) -> str:
@@ -57,8 +66,9 @@ def stability(equations: AmplitudeEquations) -> Stability:
     Raises InputError where it does not decide: a resonance forces an amplitude, or couples some too strongly.
     """
     _not_forced(equations)
-    alpha, by_waves = equations.modes.alpha, _linear_by_waves(equations)
-    growth, own = alpha + by_waves.sum(axis=1), equations.cubic.real
+    (plain, sizes), alpha, own = _linear_by_waves(equations), equations.modes.alpha, equations.cubic.real
+    by_waves = plain + sizes
+    growth = alpha + by_waves.sum(axis=1)
     coupled = _coupled(equations)
     if coupled and not growth.max() < 0.0:
         k = int(np.argmax(growth))
@@ -69,11 +79,23 @@ def stability(equations: AmplitudeEquations) -> Stability:
     half = own.shape[1]
     return Stability(
         growth=growth,
+        sizes=sizes.sum(axis=1),
         critical_scale=np.array([_first_root([a, *row[1:]]) for a, row in zip(alpha, by_waves, strict=True)]),
         critical_amplitude=np.array([_amplitude(growth[k], own[k, k % half]) for k in range(len(growth))]),
         valid_scale=_valid_scale(equations),
         valid_amplitudes=np.array([_valid_amplitude(equations, k) for k in range(len(growth))]),
     )
+
+
+def decided(equations: AmplitudeEquations) -> Stability:
+    """The condition with its margins, where the sign of each is more than round-off.
+
+    Raises InputError where it does not decide, or where no mode grows and what is left of a decay is round-off.
+    """
+    found, least = stability(equations), UNDAMPED * np.abs(equations.modes.eigenvalues)
+    if np.all(found.growth <= least) and np.any(found.growth >= -least):
+        raise InputError("condition after (3.20): wanted damped modes, got one whose decay is round-off")
+    return found
 
 
 def left_out(equations: AmplitudeEquations, s: Complex) -> float:
@@ -105,10 +127,10 @@ def _coupled(equations: AmplitudeEquations) -> list[str]:
     return list(found.values())
 
 
-def _linear_by_waves(equations: AmplitudeEquations) -> Array:
+def _linear_by_waves(equations: AmplitudeEquations) -> tuple[Array, Array]:
     """What terms linear in s add to the growth of |s_k| (n, P) by the number of waves in them: a power of the input.
 
-    Of s_k itself the real part; of the others, and of those that turn, the size.
+    First of s_k itself, the real part; then of the others, and of those that turn, the size.
     """
     n, most = equations.n, max((part.degree for part in equations.resonant), default=1)
     own, other = np.zeros((n, max(most, 2)), complex), np.zeros((n, max(most, 2)))
@@ -119,7 +141,7 @@ def _linear_by_waves(equations: AmplitudeEquations) -> Array:
                 still = (np.arange(n) == free[0]) & (delta[:, column] == 0.0)
                 own[still, len(row) - 1] += part.coefficients[still, column]
                 other[~still, len(row) - 1] += np.abs(part.coefficients[~still, column])
-    return own.real + other
+    return own.real, other
 
 
 def _valid_scale(equations: AmplitudeEquations) -> float:

@@ -24,6 +24,7 @@ from .signals import Piece
 from .standard_form import StandardForm
 
 SMALL = 0.01  # m or rad
+NEAR = 0.1  # relative detuning up to which a combination is called near to resonance, whatever its damping
 POINTS, FAR = (
     33,
     1e3,
@@ -42,6 +43,9 @@ class Resonance:
     scale       : largest frequency in it [rad/s], by which both are made relative.
     coefficient : largest of its terms in Φ_k, on this road, with all |s| = size, over size [1/s]; 0 if there is none.
     gain        : largest that one of its terms adds to a motion, at any time, relative to it; see `largest_forced`.
+                  Far off resonance too a term adds something, the more the larger the motion is.
+    near_gain   : the gain if the relative detuning is below NEAR; else of those terms alone that are detuned by less
+                  than the damping in them, 0 if there is none.
     """
 
     modes: tuple[int, ...]
@@ -51,6 +55,7 @@ class Resonance:
     scale: float
     coefficient: float
     gain: float
+    near_gain: float
 
     @property
     def relative(self) -> float:
@@ -124,12 +129,16 @@ def resonances(
 
 @dataclass(frozen=True, slots=True)
 class _Terms:
-    """Terms (R,) of Φ_k for all k: their equality (R, n/2 + 1), distance and coefficient [1/s], gain, and waves."""
+    """Terms (R,) of Φ_k for all k: their equality (R, n/2 + 1), distance and coefficient [1/s], gain, and waves.
+
+    damped_gains: of those that are detuned by less than their damping, else 0.
+    """
 
     equalities: Integers
     distances: Array
     coefficients: Array
     gains: Array
+    damped_gains: Array
     waves: NDArray[np.intp]
 
 
@@ -160,7 +169,7 @@ def _terms(
     used = usable[table.monomials].all(axis=1)
     monomials = table.monomials[used]
     equalities = unit[monomials].sum(axis=1)[None] - unit[targets][:, None]
-    distances = np.abs(rho[monomials].sum(axis=1)[None] - m.eigenvalues[targets][:, None]).ravel()
+    offs = (rho[monomials].sum(axis=1)[None] - m.eigenvalues[targets][:, None]).ravel()
     count = np.count_nonzero(monomials >= n, axis=1)
     values = (np.abs(table.coefficients[targets][:, used]) * size ** (table.degree - count - 1.0)).ravel()
     values = np.where(values > SILENT * values.max(initial=0.0), values, 0.0)
@@ -169,7 +178,14 @@ def _terms(
         forcing, mode = np.broadcast_arrays(rho[monomials].sum(axis=1)[None], m.eigenvalues[targets][:, None])
         occurs = values > 0.0
         gains[occurs] = values[occurs] * largest_forced(forcing.ravel()[occurs], mode.ravel()[occurs])
-    return _Terms(equalities.reshape(-1, unit.shape[1]), distances, values, gains, np.tile(count, len(targets)))
+    return _Terms(
+        equalities=equalities.reshape(-1, unit.shape[1]),
+        distances=np.abs(offs),
+        coefficients=values,
+        gains=gains,
+        damped_gains=np.where(np.abs(offs.imag) < np.abs(offs.real), gains, 0.0),
+        waves=np.tile(count, len(targets)),
+    )
 
 
 def largest_forced(forcing: Complex, eigenvalues: Complex) -> Array:
@@ -211,18 +227,20 @@ def _rows(terms: _Terms, frequencies: Array) -> tuple[Resonance, ...]:
     first = np.take_along_axis(equalities, np.argmax(equalities != 0, axis=1)[:, None], axis=1)
     possible = equalities.min(axis=1) * equalities.max(axis=1) < 0  # a sum of frequencies alone never vanishes
     unique, group = distinct(equalities[possible] * np.sign(first[possible]))
-    distances, coefficients, gains = (v[possible] for v in (terms.distances, terms.coefficients, terms.gains))
+    distances, coefficients = terms.distances[possible], terms.coefficients[possible]
     nearest, occurring = np.full((2, len(unique)), np.inf)
-    largest, gain = np.zeros((2, len(unique)))
+    largest, gain, damped_gain = np.zeros((3, len(unique)))
     np.minimum.at(nearest, group, distances)
     np.minimum.at(occurring, group, np.where(coefficients > 0.0, distances, np.inf))
     np.maximum.at(largest, group, coefficients)
-    np.maximum.at(gain, group, gains)
+    np.maximum.at(gain, group, terms.gains[possible])
+    np.maximum.at(damped_gain, group, terms.damped_gains[possible])
     nearest = np.where(np.isfinite(occurring), occurring, nearest)
     detunings = np.abs(unique @ frequencies)
     taking_part = (unique != 0).astype(float)
     taking_part[:, -1] = np.abs(unique[:, -1])  # νΩ is one frequency, 2β_k is β_k twice
     scales = np.max(taking_part * frequencies, axis=1)
+    near_gain = np.where(detunings < NEAR * scales, gain, damped_gain)
     order = np.lexsort((nearest, detunings / scales))
     return tuple(
         Resonance(
@@ -233,6 +251,7 @@ def _rows(terms: _Terms, frequencies: Array) -> tuple[Resonance, ...]:
             scale=float(scales[i]),
             coefficient=float(largest[i]),
             gain=float(gain[i]),
+            near_gain=float(near_gain[i]),
         )
         for i in order
     )

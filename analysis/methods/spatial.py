@@ -17,7 +17,7 @@ from scipy.linalg import eigh
 from ..errors import InputError
 from .polynomials import Array
 
-UNDRIVEN = 1e-3  # of the linear energy: a mode with less is hardly driven
+UNDRIVEN = 1e-3  # of the energy of the linear motion: a mode with less is hardly driven
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -82,11 +82,11 @@ class Transfer:
         return float(max(0.0, self.change.max()))
 
     @property
-    def undriven_share(self) -> float:
-        """Largest energy in the full motion of a mode that has less than UNDRIVEN of the whole in the linear one, over
-        the whole linear energy: more than UNDRIVEN is Φ's doing. 0 if there is no such mode."""
-        whole = self.linear.sum()
-        return float(self.nonlinear[self.linear < UNDRIVEN * whole].max(initial=0.0) / whole)
+    def undriven_gain(self) -> float:
+        """What Φ adds to the mode that gains most of those with less than UNDRIVEN of the whole energy in the linear
+        motion, over that whole; 0 if none of them gains, or there is none."""
+        undriven = self.linear < UNDRIVEN * self.linear.sum()
+        return float(self.change[undriven].max(initial=0.0))
 
 
 def transfer(modes: UndampedModes, t: Array, linear: Array, nonlinear: Array) -> Transfer:

@@ -22,7 +22,7 @@ def draw(scan: Scan) -> bytes:
             lambda ax: _frequencies(scan, ax),
             _curves(scan, "relative", "relative detuning"),
             _curves(scan, "relative_distance", "relative distance\nwith damping"),
-            _curves(scan, "gain", "gain"),
+            _curves(scan, "near_gain", "gain near\nresonance"),
         ],
         sources=(),
         needs=(),
@@ -48,14 +48,16 @@ def _curves(scan: Scan, attribute: str, words: str) -> Panel:
     """The leading resonances by one attribute, over the envelope of all."""
 
     def panel(ax: Axes) -> Axes:
-        gain = attribute == "gain"
+        gain = attribute == "near_gain"
         values = [getattr(row, attribute) for row in (scan.strongest() if gain else scan.nearest(attribute))]
-        what = "strongest of all" if gain else "nearest of those that change"
+        what = "strongest near resonance" if gain else "nearest of those that change"
         ax.semilogy(scan.values, values, color=GREY, linestyle="-", linewidth=3.0, alpha=0.5, label=what)
         for key, color in zip(_leading(scan, attribute), COLOURS, strict=False):
             row = next(table[key] for table in scan.tables if key in table)
-            ax.semilogy(scan.values, scan.curve(key, attribute), color=color, linestyle="-", label=str(row))
-        ax.set_ylim(*((1e-3 * max(values), 2.0 * max(values)) if gain else (0.5 * min(values), 1.0)))
+            curve = scan.curve(key, attribute)
+            ax.semilogy(scan.values, np.where(curve > 0.0, curve, np.nan), color=color, linestyle="-", label=str(row))
+        top = max(values) or 1.0
+        ax.set_ylim(*((1e-3 * top, 2.0 * top) if gain else (0.5 * min(values), 1.0)))
         ax.set_ylabel(words)
         ax.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=4, borderaxespad=0.2, fontsize=7.0)
         return _finished(scan, ax)
@@ -65,8 +67,8 @@ def _curves(scan: Scan, attribute: str, words: str) -> Panel:
 
 def _leading(scan: Scan, attribute: str) -> list[Key]:
     """The resonances that come nearest, of those that change, or are strongest anywhere on the map."""
-    sign = -1.0 if attribute == "gain" else 1.0
-    keys = {key for table in scan.tables for key in table} if attribute == "gain" else scan.changing
+    sign = -1.0 if attribute == "near_gain" else 1.0
+    keys = {key for table in scan.tables for key in table} if attribute == "near_gain" else scan.changing
     return sorted(keys, key=lambda key: (np.nanmin(sign * scan.curve(key, attribute)), key))[: len(COLOURS)]
 
 

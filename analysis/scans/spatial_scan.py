@@ -25,7 +25,7 @@ from ..parallel import mapped
 from ..reference import Parameters, car_of
 from ..scenario import read_scenario
 from .car_scans import VARIATIONS, higher_road, system_of, variation
-from .resonance_scan import as_csv, output_folder
+from .tables import as_csv, output_folder
 
 SPAN, SAMPLES = 5.0, 501  # s from rest, and times in it
 RTOL = 1e-9  # of the full equations; Φ's share is seen down to about this
@@ -118,15 +118,24 @@ def command(scenario: str, out: Path | None) -> int:
     edge = edges(worst, points)
     where = f"; on the edge of the grid in {' and '.join(edge)}: it may be worse beyond" if edge else ""
     print("\n".join(lines(there, f"worst of {len(points)}, by the largest gain of one mode: {in_words(worst)}{where}")))
-    for quality, words in (("moved", "moves most between modes"), ("undriven_share", "gives most to an undriven mode")):
-        most = max(points, key=lambda point: getattr(point.transfer, quality))
-        print(f"where Φ {words}: {in_words(most)}: {getattr(most.transfer, quality):.3g}")
+    print("\n".join(most_lines(points)))
     print("\n".join(heights(there)))
     if out:
         output_folder(out)
         write_whole(out / "spatial.csv", as_csv(_rows(points)))
         print(f"{out / 'spatial.csv'}: written")
     return 0
+
+
+def most_lines(points: list[Point]) -> list[str]:
+    """Where the other two measures are largest."""
+    text = []
+    for quality, words in (("moved", "moves most between modes"), ("undriven_gain", "adds most to an undriven mode")):
+        most = max(points, key=lambda point: getattr(point.transfer, quality))
+        value = getattr(most.transfer, quality)
+        where = f"{in_words(most)}: {value:.3g}" if value > 0.0 else "nowhere on the grid"
+        text.append(f"where Φ {words}: {where}")
+    return text
 
 
 def in_words(point: Point) -> str:
@@ -145,7 +154,7 @@ def said(found: Transfer) -> str:
     """The three measures of a transfer."""
     return (
         f"largest gain of one mode {found.largest_gain:.3g} of the linear energy, moved between modes "
-        f"{found.moved:.3g}, largest share of an undriven mode {found.undriven_share:.3g}"
+        f"{found.moved:.3g}, largest gain of an undriven mode {found.undriven_gain:.3g}"
     )
 
 
@@ -176,7 +185,7 @@ def _rows(points: list[Point]) -> list[list[object]]:
         *VARIATIONS,
         "largest gain of one mode [1]",
         "moved between modes [1]",
-        "largest share of an undriven mode [1]",
+        "largest gain of an undriven mode [1]",
         *(f"linear share {k}" for k in range(1, 8)),
         *(f"change {k}" for k in range(1, 8)),
     ]
@@ -188,7 +197,7 @@ def _rows(points: list[Point]) -> list[list[object]]:
                 *(p.values.get(name, "") for name in VARIATIONS),
                 p.transfer.largest_gain,
                 p.transfer.moved,
-                p.transfer.undriven_share,
+                p.transfer.undriven_gain,
                 *shares.tolist(),
                 *p.transfer.change.tolist(),
             ]
