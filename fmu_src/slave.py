@@ -95,16 +95,19 @@ class Slave(Variables):
             return
         self._running, self._stale = True, False
 
-    @unbroken
     def do_step(self, current_time: float, step_size: float) -> bool:
-        """One communication step; where it is refused False (fmi2Discard), a message, and the last good state."""
-        if self.failed:
-            return False
-        if not self._running:
-            self._say("a step was asked for outside of initialized time")
-            return False
-        kept = (self.memory(), self.y[:], self.time)
+        """One communication step; where it is refused False (fmi2Discard), a message, and the last good state.
+
+        An interrupt that strikes in it refuses it. It must not strike when the step is made: nothing is called then.
+        """
+        kept = None
         try:
+            if self.failed:
+                return False
+            if not self._running:
+                self._say("a step was asked for outside of initialized time")
+                return False
+            kept = (self.memory(), self.y[:], self.time)
             self._check_step(current_time, step_size)
             if current_time != self.time:
                 self.jump(current_time)
@@ -114,14 +117,15 @@ class Slave(Variables):
                 self.feed_through()
             if not isfinite(sum(self.y)):
                 refuse(None if isfinite(x) else f"{q.name} = {x!r} {q.unit}" for q, x in self._outputs())
+            self.time, self._stale = current_time + step_size, False
+            return True
         except BaseException as error:  # of whatever kind: the step is refused, and the component as it was before
-            memory, self.y[:], self.time = kept
-            self.recall(memory)
+            if kept:
+                memory, self.y[:], self.time = kept
+                self.recall(memory)
             what = f"step of {step_size:g} s from t = {current_time:g} s: {str(error) or repr(error)}"
             self._say(f"{what}; the state at t = {self.time:g} s is kept", error)
             return False
-        self.time, self._stale = current_time + step_size, False
-        return True
 
     @unbroken
     def enter_initialization_mode(self) -> None:
