@@ -38,6 +38,8 @@ MODELS = {
 }
 ENTRY = '''"""Slave script of {model}.fmu; the hash in its name keeps it apart from other versions in a process."""
 
+import sys
+
 from {package}.{module} import {model} as _{model}
 
 _references = []
@@ -48,11 +50,18 @@ class {model}(_{model}):
 
     identity = "{identity}"
 
-    def __init__(self, **kwargs):
+    def _set_up(self, **kwargs):
         # At each instantiation PythonFMU's loader gives up a reference to this module's dictionary which it never
         # took; without this line the module is empty after a few instances.
         _references.append(globals())
-        super().__init__(**kwargs)
+        # It also puts the resources in front of the path anew, where they are already.
+        if sys.path.count(kwargs["resources"]) > 1:
+            sys.path.remove(kwargs["resources"])
+        super()._set_up(**kwargs)
+
+
+# And it runs this script anew, and keeps the class: all instances have the first one.
+{model} = globals().setdefault("_first", {model})
 '''
 
 
@@ -109,7 +118,7 @@ def _install(extras: list[str]) -> None:
 # ---------------------------------------------------------------------------------------------------- FMUs
 def build() -> None:
     """Build the FMUs, their cross-check sets, the .ssp that wires them and the container, unless up to date."""
-    beside = ("build.py", "constraints.txt", "LICENSE", "analysis/scenario.py")
+    beside = ("build.py", "constraints.txt", "LICENSE", "analysis/scenario.py", "pyproject.toml")
     fresh = _content_hash([PACKAGE, *(ROOT / name for name in beside)])
     stamp = DIST / "sources.sha256"
     made = [DIST / "VehicleOnRoad.ssp", DIST / "VehicleOnRoad.fmu", *(DIST / f"{model}.fmu" for model in MODELS)]

@@ -2,6 +2,8 @@
 
 An interrupt strikes in whatever Python code is running, that of an FMU included, where it is no fault of the component:
 the call is completed or, if it is a step, refused, and the interrupt strikes again in the host after the call.
+It strikes where a function begins, after what has been called returns, and where a loop goes round: what follows the
+last call of a function is done as a whole. One that strikes outside of the function's `try` reaches the library.
 
 At any exception PythonFMU's library gives up its references to the instance, to its class and to its log, and once more
 when the instance is freed: the host would die then. `keep` adds the references that make up for it.
@@ -42,7 +44,10 @@ def again(interrupt: BaseException, message: object) -> object:
 
 
 def unbroken(call: Callable[..., Any]) -> Callable[..., Any]:
-    """An FMI call that is made anew if an interrupt breaks out of it; the interrupt strikes again after it."""
+    """An FMI call that is made anew if an interrupt breaks out of it; the interrupt strikes again after it.
+
+    It may have been complete already: a call must do no harm when it is made twice.
+    """
 
     @wraps(call)
     def whole(self: Variables, *arguments: Any) -> Any:
@@ -91,6 +96,6 @@ class Messages(list[Any]):
 
     def __del__(self) -> None:
         owner = self.owner()
-        if owner is not None and not owner.failed:
+        if owner is not None and owner._messages() is self and not owner.failed:
             owner.failed = True
             keep(owner, type(owner), self)

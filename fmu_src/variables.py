@@ -38,6 +38,8 @@ class Variables(Fmi2Slave):
     dependencies: ClassVar[dict[str, tuple[str, ...]]] = {}  # output -> inputs that it depends on within a step
     initially: ClassVar[dict[str, tuple[str, ...]]] = {}  # output -> start values and parameters; default: all
     guid: object
+    log_queue: Any
+    _get_log_queue: Any
     identity: ClassVar[str] = ""  # hash of the code, set by the slave script of an exported FMU
 
     log_categories = LOG_CATEGORIES
@@ -48,6 +50,15 @@ class Variables(Fmi2Slave):
     default_experiment = DefaultExperiment(start_time=0.0, stop_time=5.0, step_size=1e-3)
 
     def __init__(self, **kwargs: object) -> None:
+        try:
+            self._set_up(**kwargs)
+        except Exception:
+            raise
+        except BaseException as interrupt:  # the library would end the host if this failed in a reset
+            self._set_up(**kwargs)
+            self.put_off(interrupt)
+
+    def _set_up(self, **kwargs: object) -> None:
         super().__init__(**kwargs)
         if self.identity:
             self.guid = self.identity
@@ -66,6 +77,10 @@ class Variables(Fmi2Slave):
         self._reading: dict[tuple[int, ...], Reader] = {}  # lists of references
         self._writing: dict[tuple[int, ...], Writer] = {}  # that have passed
         self._register()
+        messages = Messages(self)
+        self._messages, self.log_queue = weakref.ref(messages), weakref.proxy(messages)
+        # no Python code: the library calls this once, cannot bear that it fails, and then alone has the messages
+        self._get_log_queue = [messages].pop
 
     def _register(self) -> None:
         parameter = {"causality": Fmi2Causality.parameter, "variability": Fmi2Variability.fixed}
@@ -192,9 +207,10 @@ class Variables(Fmi2Slave):
         """Refuse a call that has no status of its own: by an exception, PythonFMU's only way, and only once."""
         self._say(why)
         if not self.failed:
-            self.failed = True
             keep(self, type(self), self._messages())
-            raise RuntimeError(printable(why))  # PythonFMU logs it, too
+            refusal = RuntimeError(printable(why))  # PythonFMU logs it, too
+            self.failed = True  # at last: where an interrupt strikes before this, the refusal is made anew
+            raise refusal
 
     def _say(self, why: str, cause: BaseException | None = None, status: Fmi2Status = Fmi2Status.error) -> None:
         """Log why something is refused; if the cause is an interrupt, it strikes again after this call."""
@@ -209,16 +225,9 @@ class Variables(Fmi2Slave):
         words = f"{interrupt!r} fell into a call, which was completed; it goes on to the host"
         self._say(words, interrupt, Fmi2Status.warning)
 
-    @unbroken
-    def _get_log_queue(self) -> Messages:
-        """The log for the library, which calls this once, and then alone holds it."""
-        messages = Messages(self)
-        self._messages, self.log_queue = weakref.ref(messages), weakref.proxy(messages)
-        return messages
-
 
 def _nobody() -> None:
-    """There is no library yet that has asked for the log."""
+    """There are no messages yet."""
 
 
 def printable(text: str) -> str:

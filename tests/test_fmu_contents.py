@@ -160,7 +160,15 @@ def test_texts_say_what_is_needed(dist: Path, model: str) -> None:
     assert files["documentation/licenses/license.txt"] == (ROOT / "LICENSE").read_bytes()
     assert b"NTNU" in files["documentation/licenses/pythonfmu.txt"]
     needs = files["documentation/externalDependencies.txt"].decode("ascii")
-    for word in ("CPython 3.10", "LD_PRELOAD", "PYTHONHOME", "sys.base_prefix", "_Py_NoneStruct", "glibc 2.32"):
+    for word in (
+        "CPython 3.10",
+        "LD_PRELOAD",
+        "PYTHONHOME",
+        "sys.base_prefix",
+        "_Py_NoneStruct",
+        "glibc 2.32",
+        "SIGTERM",
+    ):
         assert word in needs
     assert ("scipy>=" in needs) == (model == "LqrController")
     assert "control>=" not in needs
@@ -341,3 +349,22 @@ def test_the_guid_is_that_of_all_that_acts(tmp_path: Path, monkeypatch: pytest.M
         path.write_bytes(kept + b" ")
         assert changed() == models, path
         path.write_bytes(kept)
+
+
+def test_all_that_the_fmus_state_decides_whether_they_are_built_anew(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Their requirements.txt speaks of pyproject.toml."""
+    looked_at: list[Path] = []
+
+    def content_hash(paths: list[Path]) -> str:
+        looked_at.extend(paths)
+        return "same"
+
+    monkeypatch.setattr(build, "DIST", tmp_path)
+    monkeypatch.setattr(build, "_content_hash", content_hash)
+    for name in ("VehicleOnRoad.ssp", "VehicleOnRoad.fmu", *(f"{model}.fmu" for model in build.MODELS)):
+        (tmp_path / name).touch()
+    (tmp_path / "sources.sha256").write_text("same")
+    build.build()
+    assert {ROOT / "pyproject.toml", ROOT / "LICENSE", build.PACKAGE} <= set(looked_at)

@@ -97,6 +97,9 @@ def test_fmpys_container_passes_on_one_pair_of_components_after_another(
 
 def test_fmpys_container_is_a_valid_fmu_with_all_parameters(system: Path, container: Path) -> None:
     assert validate_fmu(str(container)) == []
+    unknowns = fmpy.read_model_description(str(container)).initialUnknowns
+    assert len(unknowns) == 31
+    assert all(u.dependencies is None for u in unknowns)  # FMI: on all, parameters included
     start = {**dict(LATE_ITEMS), "vehicle.body.heave": 0.01}
     found = fmpy.simulate_fmu(
         str(container), stop_time=0.3, output_interval=STEP, start_values=start, output=["road.h_fl", "road.h_fr"]

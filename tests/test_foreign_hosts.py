@@ -23,12 +23,14 @@ def test_a_c_program_runs_the_fmus_to_the_bit_on_a_bare_python(
     host = compiled("c_host.c", "-I", Path(fmpy.__file__).parent / "c-code", *link, "-ldl")
     plan, names = write_plan(system, tmp_path / "unpacked", COUNT)
     asks = (
-        "import importlib.util, sys; packages = ('numpy', 'scipy', 'control', 'fmpy', 'pythonfmu', 'fmu_src')\n"
-        "print(sys.prefix, [p for p in packages if importlib.util.find_spec(p)], flush=True)"
+        "import importlib.util, signal, sys; packages = ('numpy', 'scipy', 'control', 'fmpy', 'pythonfmu', 'fmu_src')\n"
+        "print(sys.prefix, [p for p in packages if importlib.util.find_spec(p)], end=' ')\n"
+        "print(signal.getsignal(signal.SIGINT).__name__, signal.getsignal(signal.SIGTERM).name, flush=True)"
     )
     environment = {"PATH": str(bare), "LD_PRELOAD": "" if linked else preload, "PYTHON_SAYS": asks}
     said = call(host, plan, tmp_path / "result", cwd=tmp_path, environment=environment)
     assert said.split()[:2] == [str(bare.parent), "['pythonfmu']"]  # the FMUs' own copy, in their resources
+    assert said.split()[2:4] == ["default_int_handler", "SIG_DFL"]  # README says what becomes of Ctrl-C
     rows = np.fromfile(tmp_path / "result").reshape(-1, len(names))
     np.testing.assert_array_equal(rows, ours(system).columns(names))
 

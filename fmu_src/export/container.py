@@ -11,7 +11,6 @@ from __future__ import annotations
 import hashlib
 import tempfile
 import zipfile
-from collections.abc import Iterator
 from pathlib import Path
 
 from attrs import evolve
@@ -108,14 +107,8 @@ def _description(
     made.coSimulation = CoSimulation(
         modelIdentifier="container_fmu", fixedInternalStepSize=step, canHandleVariableCommunicationStepSize=False
     )
-    known = [v for v in variables if v.initial == "exact" and v.causality == "output"]
-    made.outputs = [Unknown(variable=v, dependencies=[]) for v in variables if v.causality == "output"]
-    made.initialUnknowns = list(_initial_unknowns(made.outputs, known))
+    outputs = [v for v in variables if v.causality == "output"]
+    made.outputs = [Unknown(variable=v, dependencies=[]) for v in outputs]
+    # without dependencies: on start values and parameters of all components, the container does not say which
+    made.initialUnknowns = [Unknown(variable=v) for v in outputs if v.initial != "exact"]
     return made
-
-
-def _initial_unknowns(outputs: list[Unknown], known: list[ModelVariable]) -> Iterator[Unknown]:
-    """Outputs that follow from others at the start; the states, which can be set, are what they follow from."""
-    for unknown in outputs:
-        if unknown.variable not in known:
-            yield Unknown(variable=unknown.variable, dependencies=known)
