@@ -225,6 +225,58 @@ def test_a_step_longer_than_the_whole_control_is_refused_and_a_shorter_one_is_no
 
 
 @pytest.mark.parametrize(
+    ("step", "status"),
+    [
+        (0.15, DISCARD),  # samples at 0, 0.3 and 0.6 s, of 0, 0.24 and 0.48 s; control from 0.32 to 0.49 s
+        (0.12, OK),  # a sample at 0.48 s
+    ],
+)
+def test_a_step_that_ends_control_before_a_sample_of_it_was_taken_is_refused_and_a_shorter_one_is_not(
+    folder: Path, step: float, status: int
+) -> None:
+    parameters = {"tau0": 0.02, "T": 0.49, "sample_time": 0.24}
+    host = Host(folder)
+    assert host.set(parameters) == OK
+    assert host.start() == OK
+    assert host.set(dict.fromkeys(host.inputs, 0.01)) == OK
+    t = 0.0
+    while t + step < 0.49:
+        assert host.step(t, step) == OK
+        t += step
+    acted = any(host.get())
+    assert host.step(t, step) == status
+    assert acted is (status == OK)
+    if status == DISCARD:
+        said = "T = 0.49 s, sample_time = 0.24 s: wanted a sample within the control from 0.32 s on, got one at 0.3 s"
+        assert f"{said} and the next at 0.6 s" in str(host.log)
+        assert host.step(t, 0.03) == OK
+        assert any(host.get())
+        assert host.step(t + 0.03, step) == OK
+    assert not any(host.get())
+    host.free()
+
+
+@pytest.mark.parametrize(
+    ("changes", "t", "step", "last", "refused"),
+    [
+        ({}, 0.45, 0.15, 0.3, True),
+        ({}, 0.45, 0.15, 0.32 - 1e-12, False),  # one at the begin is one of control
+        ({}, 0.45, 0.04, 0.3, True),  # to T itself, where control is over
+        ({}, 0.45, 0.03, 0.3, False),  # not to its end
+        ({}, 0.49, 0.15, 0.3, False),  # control is over
+        ({"enabled": False}, 0.45, 0.15, 0.3, False),
+        ({"sample_time": 0.0}, 0.45, 0.15, 0.0, False),
+        ({"horizon": "infinite"}, 0.45, 0.15, 0.3, False),
+    ],
+)
+def test_which_steps_end_a_control_without_a_sample(
+    changes: dict[str, Any], t: float, step: float, last: float, refused: bool
+) -> None:
+    control = control_parameters({"tau0": 0.02, "T": 0.49, "sample_time": 0.24, **changes})
+    assert bool(control.fault_of_samples(t, step, last)) is refused
+
+
+@pytest.mark.parametrize(
     ("parameters", "start", "said"),
     [
         (
