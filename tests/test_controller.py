@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import re
 import subprocess
 import sys
@@ -26,7 +27,7 @@ from fmu_src.controller.fullcar import FullCar
 from fmu_src.controller.halfcar import HalfCar, half_car_state, strut_forces
 from fmu_src.controller.law import ControlParameters, control_law, control_parameters
 from fmu_src.controller.lqr_controller import LqrController
-from fmu_src.controller.riccati import finite_horizon, infinite_horizon, riccati_rate
+from fmu_src.controller.riccati import exponentials, finite_horizon, infinite_horizon, riccati_rate
 from fmu_src.quantities import ParameterError
 from fmu_src.vehicle.linear import linearized
 from fmu_src.vehicle.parameters import Car
@@ -53,6 +54,23 @@ def test_scalar_lqr_has_its_closed_form() -> None:
     assert_allclose(infinite_horizon(A, B, Q, R)[0], [[a + w]], rtol=1e-12)
     expected = np.sinh(w * s) / (w * np.cosh(w * s) - a * np.sinh(w * s))
     assert_allclose(finite_horizon(A, B, Q, R, s)[:, 0, 0], expected, rtol=1e-10, atol=1e-12)
+
+
+def test_exponentials_are_those_of_scipy_and_have_their_closed_forms() -> None:
+    """exp of a turn by w with decay, of a nilpotent, of 0, and of a full car's flow over [0, 2 s]; scaled or not."""
+    for w in (0.0, 1e-3, 1.0, 40.0):
+        J, t = np.array([[-0.3, w], [-w, -0.3]]), np.linspace(0.0, 3.0, 7)
+        c, s = np.exp(-0.3 * t) * np.cos(w * t), np.exp(-0.3 * t) * np.sin(w * t)
+        expected = np.moveaxis(np.array([[c, s], [-s, c]]), 2, 0)
+        assert_allclose(exponentials(J * t[:, None, None]), expected, rtol=0, atol=1e-13)
+    N = np.diag([2.0, 3.0], k=1)
+    assert_allclose(exponentials(N[None])[0], np.eye(3) + N + N @ N / 2, rtol=0, atol=1e-15)
+    assert_allclose(exponentials(np.zeros((2, 3, 3))), np.broadcast_to(np.eye(3), (2, 3, 3)), rtol=0, atol=1e-15)
+    A, B, Q, R, _ = problem(FullCar())
+    closed = A + B @ infinite_horizon(A, B, Q, R)[1]
+    for reach in (1e-3, 0.1, 2.0):
+        X = closed * np.linspace(0.0, reach, 18)[:, None, None]
+        assert np.abs(exponentials(X) - expm(X)).max() < 1e-11 * np.abs(expm(X)).max()
 
 
 def test_algebraic_riccati_residual_vanishes_and_scipy_agrees(matrices: tuple[Array, Array, Array, Array]) -> None:
@@ -207,6 +225,58 @@ def test_a_step_longer_than_the_whole_control_is_refused_and_a_shorter_one_is_no
 
 
 @pytest.mark.parametrize(
+    ("step", "status"),
+    [
+        (0.15, DISCARD),  # samples at 0, 0.3 and 0.6 s, of 0, 0.24 and 0.48 s; control from 0.32 to 0.49 s
+        (0.12, OK),  # a sample at 0.48 s
+    ],
+)
+def test_a_step_that_ends_control_before_a_sample_of_it_was_taken_is_refused_and_a_shorter_one_is_not(
+    folder: Path, step: float, status: int
+) -> None:
+    parameters = {"tau0": 0.02, "T": 0.49, "sample_time": 0.24}
+    host = Host(folder)
+    assert host.set(parameters) == OK
+    assert host.start() == OK
+    assert host.set(dict.fromkeys(host.inputs, 0.01)) == OK
+    t = 0.0
+    while t + step < 0.49:
+        assert host.step(t, step) == OK
+        t += step
+    acted = any(host.get())
+    assert host.step(t, step) == status
+    assert acted is (status == OK)
+    if status == DISCARD:
+        said = "T = 0.49 s, sample_time = 0.24 s: wanted a sample within the control from 0.32 s on, got one at 0.3 s"
+        assert f"{said} and the next at 0.6 s" in str(host.log)
+        assert host.step(t, 0.03) == OK
+        assert any(host.get())
+        assert host.step(t + 0.03, step) == OK
+    assert not any(host.get())
+    host.free()
+
+
+@pytest.mark.parametrize(
+    ("changes", "t", "step", "last", "refused"),
+    [
+        ({}, 0.45, 0.15, 0.3, True),
+        ({}, 0.45, 0.15, 0.32 - 1e-12, False),  # one at the begin is one of control
+        ({}, 0.45, 0.04, 0.3, True),  # to T itself, where control is over
+        ({}, 0.45, 0.03, 0.3, False),  # not to its end
+        ({}, 0.49, 0.15, 0.3, False),  # control is over
+        ({"enabled": False}, 0.45, 0.15, 0.3, False),
+        ({"sample_time": 0.0}, 0.45, 0.15, 0.0, False),
+        ({"horizon": "infinite"}, 0.45, 0.15, 0.3, False),
+    ],
+)
+def test_which_steps_end_a_control_without_a_sample(
+    changes: dict[str, Any], t: float, step: float, last: float, refused: bool
+) -> None:
+    control = control_parameters({"tau0": 0.02, "T": 0.49, "sample_time": 0.24, **changes})
+    assert bool(control.fault_of_samples(t, step, last)) is refused
+
+
+@pytest.mark.parametrize(
     ("parameters", "start", "said"),
     [
         (
@@ -267,17 +337,27 @@ def test_the_gain_of_the_infinite_horizon_is_that_of_python_control(car: HalfCar
     assert_allclose(np.sort_complex(np.linalg.eigvals(A + B @ K)), np.sort_complex(poles), rtol=1e-6)
 
 
-def test_a_design_of_14_states_in_a_fresh_process_takes_well_under_a_second() -> None:
-    """Measured: 0.2 s of CPU time, imports included; python-control alone would bring 0.9 s more."""
+def test_a_design_of_14_states_takes_well_under_a_second_with_as_many_threads_as_a_host_lets_blas_have() -> None:
+    """Measured, two cores, mostly busy: 0.3 s of CPU time in a fresh process, of which 0.25 s imports, then 0.04 to
+    0.05 s each; exponentials in BLAS calls of their own made that 0.10 to 0.20 s. python-control would bring 0.9 s."""
     code = (
         "import sys, time\nfrom fmu_src.controller.design import design\n"
-        "from fmu_src.controller.fullcar import FullCar\ndesign(FullCar(lam=2e10), infinite=True, span=2.0)\n"
-        "print([m for m in ('control', 'scipy.signal', 'scipy.integrate') if m in sys.modules], time.process_time())\n"
+        "from fmu_src.controller.fullcar import FullCar\n"
+        "def made(k): design(FullCar(lam=2e10 + k), infinite=True, span=2.0)\n"
+        "made(0)\nfirst = time.process_time()\n"
+        "for k in range(1, 21): made(k)\n"
+        "print([m for m in ('control', 'scipy.signal', 'scipy.integrate') if m in sys.modules])\n"
+        "print(first, (time.process_time() - first) / 20)\n"
     )
-    said = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True).stdout
-    imported, _, seconds = said.rpartition(" ")
+    host = {name: value for name, value in os.environ.items() if not name.endswith("_NUM_THREADS")}
+    command = [sys.executable, "-c", code]
+    imported, seconds = subprocess.run(
+        command, cwd=ROOT, env=host, capture_output=True, text=True, check=True
+    ).stdout.splitlines()
     assert imported == "[]"
-    assert float(seconds) < 1.0
+    first, each = map(float, seconds.split())
+    assert first < 1.0
+    assert each < 0.075
 
 
 @pytest.mark.parametrize("car", [HalfCar(), FullCar()])

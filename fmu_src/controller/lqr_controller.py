@@ -73,7 +73,8 @@ class LqrController(Slave):
         self._memory = _memory(remembered)
 
     def advance(self, t: float, step: float) -> None:
-        if fault := self._control.fault_of_step(t, step):
+        control = self._control
+        if fault := control.fault_of_step(t, step) or control.fault_of_samples(t, step, self._memory.time):
             raise StepError(fault)
         if self._loop:
             self._memory = self._looked(t + step, self._loop.elapsed(step, self._memory))
