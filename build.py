@@ -279,7 +279,11 @@ def main() -> int:
     verb.add_argument("scenario", nargs="?", default="bump", help="a built-in scenario, a .toml file, or a run.json")
     verb.add_argument("-o", "--out", type=Path, help="run folder (default: runs/SCENARIO, replaced if it is a run)")
     verbs.add_parser("test", help="lint, types, import contracts, tests; further arguments go to pytest")
-    for name, what in (("build", "build dist/*.fmu and the .ssp"), ("bench", "benchmarks"), ("clean", "tidy up")):
+    for name, what in (
+        ("build", "build dist/*.fmu and the .ssp"),
+        ("bench", "benchmarks"),
+        ("clean", "remove .venv, dist, caches"),
+    ):
         verbs.add_parser(name, help=what)
     options, further = parser.parse_known_args()
     if further and options.verb != "test":

@@ -222,6 +222,7 @@ def _judge(run: Run, folder: Path) -> int:
     from .findings import Finding, write_findings
     from .run_averaging import averaged_findings
     from .run_series import series_findings
+    from .tyres import lift_off
 
     findings = check(run)
     if short := too_short(run):
@@ -241,6 +242,8 @@ def _judge(run: Run, folder: Path) -> int:
     write_findings(findings, folder / FINDINGS)
     for f in findings:
         print(f.line)
+    if words := lift_off(run):
+        print(f"contact: the model's tyres pulled where real ones leave the ground: {words}", file=sys.stderr)
     return 0 if all(f.holds for f in findings) else 1
 
 

@@ -27,10 +27,9 @@ from .findings import Finding
 from .ride import BAND, lacking, ride, table
 from .run_figures import is_controlled
 from .run_words import control_words, summary
-from .trajectory import COUNTERPART, FINDINGS, OTHER_DESIGN, RECORD, Run, Trajectory, read_run
+from .trajectory import COUNTERPART, FIGURES, FINDINGS, OTHER_DESIGN, RECORD, REPORT, Run, Trajectory, read_run
 from .tyres import static_loads, time_below_zero, tyre_loads
 
-REPORT = "report.html"
 TEMPLATE = "report.html"
 WORDS = {
     name: text
@@ -105,7 +104,7 @@ def write_report(run_folder: Path) -> Path:
         states=[extreme(run.trajectory, q) for q in STATES if q.name in run.trajectory.names],
         tyres=tyre_table(run),
         stop=float(run.trajectory.time[-1]),
-        figures=[(entry, _as_data(run_folder / run_figures.FOLDER / entry.file)) for entry in entries],
+        figures=[(entry, _as_data(run_folder / FIGURES / entry.file)) for entry in entries],
         left_out=run_figures.left_out(run, counterpart),
         counterpart=counterpart is not None,
         certified=bool(certified),

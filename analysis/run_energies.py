@@ -18,13 +18,12 @@ from .methods.polynomials import Array
 from .methods.series import partial_sums
 from .methods.spatial import Transfer, UndampedModes, transfer
 from .reference import car_of
-from .run_figures import ENERGIES, FOLDER
+from .run_figures import ENERGIES
 from .run_series import MOST_ROWS, series_terms
 from .scans.spatial_scan import car_modes, said
 from .scans.tables import as_csv
-from .trajectory import Run, read_run
+from .trajectory import FIGURES, MODAL_ENERGIES, Run, read_run
 
-TABLE = "modal-energies.csv"
 SERIES = ("order 0", "order 1")
 LOOKS = (("run", BLUE, "-"), (SERIES[0], ORANGE, DASHED), (SERIES[1], RED, DOTTED))
 
@@ -65,14 +64,14 @@ def command(folder: Path, out: Path | None) -> int:
     found = energies_of(run)
     controlled = bool(np.any(run.trajectory.columns([q.name for q in FORCES])))
     print("\n".join(lines(found, f"{folder}{', under its actuators' if controlled else ''}")))
-    figures = out or folder / FOLDER
+    figures = out or folder / FIGURES
     try:
         figures.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise InputError(f"{figures}: nothing can be written there: {error}") from error
     picture = subject(found, run)
     for path, content in (
-        ((out or folder) / TABLE, as_csv(rows(found))),
+        ((out or folder) / MODAL_ENERGIES, as_csv(rows(found))),
         (figures / ENERGIES, render(picture, picture.caption())),
     ):
         write_whole(path, content)

@@ -35,10 +35,9 @@ from .figures import (
     words,
 )
 from .files import write_whole
-from .trajectory import Run, Trajectory
+from .trajectory import FIGURES, Run, Trajectory
 from .tyres import static_loads, tyre_loads
 
-FOLDER = "figures"
 TUBE, DELTA = "certified-tube.svg", "certified-delta.svg"  # drawn by `certify RUN`, with their captions in them
 ENERGIES = "modal-energies.svg"  # by `spatial RUN`, likewise
 Z, PSI, PHI, Z11, Z12, Z2, PSI2 = POSITIONS
@@ -55,7 +54,7 @@ class FigureEntry:
 
 def draw_all(run: Run, counterpart: Run | None, folder: Path, other_design: Run | None = None) -> list[FigureEntry]:
     """Write `figures/*.svg` into the run's folder: all figures whose columns were recorded."""
-    target = folder / FOLDER
+    target = folder / FIGURES
     target.mkdir(exist_ok=True)
     drawn = [subject for subject in subjects(run, counterpart, other_design) if not subject.missing]
     for subject in drawn:
@@ -74,7 +73,7 @@ def energies(folder: Path) -> list[FigureEntry]:
 
 
 def _kept(folder: Path, *names: str) -> list[FigureEntry]:
-    found = [folder / FOLDER / name for name in names]
+    found = [folder / FIGURES / name for name in names]
     return [FigureEntry(path.name, *described(path.read_bytes(), str(path))) for path in found if path.is_file()]
 
 

@@ -27,7 +27,7 @@ from fmu_src.road.road_excitation import RoadExcitation
 from fmu_src.vehicle.vehicle7dof import Vehicle7DOF
 
 from .errors import InputError
-from .trajectory import read_record
+from .trajectory import RECORD, read_record
 
 BUILT_IN = Path(__file__).resolve().parents[1] / "fmu_src" / "system" / "scenarios"
 MAX_STEPS = 10_000_000  # of a run; more is a mistyped step rather than a wish
@@ -93,6 +93,9 @@ def read_scenario(name_or_path: str) -> Scenario:
         return _checked(read_record(path)["scenario"], path, "", flat=True)
     try:
         text = path.read_text(encoding="utf-8")
+    except IsADirectoryError:
+        inside = f"; {path / RECORD} is one" if (path / RECORD).is_file() else ""
+        raise InputError(f"{path}: wanted a scenario, got a folder{inside}") from None
     except FileNotFoundError:
         known = ", ".join(built_in_scenarios())
         raise InputError(f"{name_or_path}: no such file, and no built-in scenario; known are: {known}") from None

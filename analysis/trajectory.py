@@ -26,6 +26,8 @@ from .errors import InputError
 Array = NDArray[np.float64]
 CSV, RECORD, FINDINGS, CERTIFICATE = "trajectory.csv", "run.json", "findings.json", "certificate.json"
 COUNTERPART, OTHER_DESIGN = "counterpart", "other-design"  # folders of the runs beside a run, see `beside.py`
+REPORT, FIGURES, MODAL_ENERGIES = "report.html", "figures", "modal-energies.csv"
+OF_A_RUN = {CSV, RECORD, FINDINGS, CERTIFICATE, COUNTERPART, OTHER_DESIGN, REPORT, FIGURES, MODAL_ENERGIES}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -179,8 +181,8 @@ def new_run_folder(target: Path) -> Iterator[Path]:
     with contextlib.ExitStack() as stack:
         try:
             place = target.resolve()
-            if place.exists() and not _may_be_replaced(place):
-                raise InputError(f"{target}: is there already and is not a run folder; it is left alone")
+            if place.exists():
+                _refuse_others(place, target)
             for folder in reversed(place.parents):  # the innermost is removed first
                 if not folder.exists():
                     stack.callback(_remove_if_empty, folder)
@@ -203,13 +205,17 @@ def new_run_folder(target: Path) -> Iterator[Path]:
                 older.rename(place)
 
 
-def _may_be_replaced(folder: Path) -> bool:
-    """Whether the folder is empty or holds a run."""
-    if not folder.is_dir():
-        return False
-    with contextlib.suppress(InputError):
-        return bool(read_record(folder / RECORD))
-    return not any(folder.iterdir())
+def _refuse_others(folder: Path, target: Path) -> None:
+    """Raise InputError unless the folder is empty or holds a run and nothing else at its top."""
+    held = sorted(path.name for path in folder.iterdir()) if folder.is_dir() else [""]
+    if not held:
+        return
+    try:
+        read_record(folder / RECORD)
+    except InputError as error:
+        raise InputError(f"{target}: is there already and is not a run folder; it is left alone") from error
+    if foreign := sorted(set(held) - OF_A_RUN):
+        raise InputError(f"{target}: holds {', '.join(foreign)}, not of a run; it is left alone: move that first")
 
 
 def _remove_if_empty(folder: Path) -> None:

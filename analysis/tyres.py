@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from fmu_src.quantities import TYRE_FORCES
+from fmu_src.quantities import CORNER_WORDS, TYRE_FORCES
 from fmu_src.vehicle.parameters import Car
 
 from .reference import car_of
@@ -40,6 +40,14 @@ def tyre_heights(car: Car, q: Any, v: Any, sin: Any, cos: Any) -> tuple[list[Any
 def tyre_loads(run: Run) -> Array:
     """Total vertical loads (n, 4) [N] of the tyres: static load and exported tyre force."""
     return static_loads(run) + run.trajectory.columns([q.name for q in TYRE_FORCES])
+
+
+def lift_off(run: Run) -> str:
+    """Which tyres had no load, and for how long, in words; "" for none, or where their forces were not recorded."""
+    if any(q.name not in run.trajectory.names for q in TYRE_FORCES):
+        return ""
+    lost = [time_below_zero(run.trajectory.time, loads) for loads in tyre_loads(run).T]
+    return ", ".join(f"{words} {s * 1e3:.3g} ms" for words, s in zip(CORNER_WORDS, lost, strict=True) if s > 0.0)
 
 
 def time_below_zero(time: Array, values: Array) -> float:

@@ -20,6 +20,7 @@ from analysis.bertolino_baksa.certificate import Certificate, to_json
 from analysis.bertolino_baksa.funnel import ends, funnel
 from analysis.bertolino_baksa.proof import Proof
 from analysis.car import car_form, road_signal
+from analysis.certificates import adversary_points as adversary
 from analysis.certificates import certificate_command, certified_run
 from analysis.certificates.adversary_points import Points, adversary_points
 from analysis.certificates.car_certificates import certify_car
@@ -60,7 +61,7 @@ def at_hand(made: Made, points: list[Points], monkeypatch: pytest.MonkeyPatch) -
     """What takes long was made before."""
     for module in (certificate_command, certified_run):
         monkeypatch.setattr(module, "certify_car", lambda parameters: made)
-    for module in (certificate_command, certified_run):
+    for module in (adversary, certified_run):
         monkeypatch.setattr(module, "adversary_points", lambda certificate: points)
 
 
@@ -193,6 +194,9 @@ def test_a_start_off_rest_is_judged_by_its_own_epsilon(made: Made, tmp_path: Pat
     assert all(f.holds and f.tolerance > 100.0 * made[0].claims[0].floor for f in found)
     far, reason = certified_run.definition_findings(run_of(start={"body.roll": 1.4}), path)
     assert far == [] and "off x_lin in the energy norm; wanted less than" in reason
+    some, reason = certified_run.definition_findings(run_of(start={"body.roll": 0.0175}), path)
+    assert "√J" in [f.unit for f in some] and all(f.holds for f in some)
+    assert "off x_lin in the weighted sup norm" in reason and "energy" not in reason
 
 
 @pytest.mark.parametrize(

@@ -181,7 +181,7 @@ def nothing(_: Path) -> None:
 
 BAD: dict[str, tuple[Callable[[Path], object], str, str]] = {
     "no such scenario": (nothing, "simulate bumb -o out", "bumb: no such file, .* known are: bump"),
-    "folder as scenario": (nothing, "simulate run -o out", "run: cannot be read"),
+    "folder as scenario": (nothing, "simulate run -o out", r"run: wanted a scenario, got a folder; run/run"),
     "broken toml": (write("x.toml", "[a"), "simulate x.toml -o out", r"x\.toml: not TOML"),
     "wrong unit": (write("x.toml", "parameters.v0 = '1 kg'"), "simulate x.toml -o out", r"x\.toml:1: v0 = '1 kg'"),
     "no steps": (write("x.toml", "simulation.step = 0"), "run x.toml -o out", r"x\.toml:1: step = 0\.0 s"),

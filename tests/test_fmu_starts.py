@@ -8,7 +8,7 @@ from dataclasses import replace
 import pytest
 
 from analysis.__main__ import main
-from analysis.certificates import certificate_command, fmu_starts
+from analysis.certificates import adversary_points, certificate_command, fmu_starts
 from analysis.certificates.car_certificates import certify_car
 from analysis.scenario import read_scenario
 
@@ -34,7 +34,7 @@ def test_the_command_fails_where_a_start_gets_beyond(
 
     made = certify_car({})
     monkeypatch.setattr(certificate_command, "certify_car", lambda parameters: made)
-    monkeypatch.setattr(certificate_command, "adversary_points", lambda certificate: [])
+    monkeypatch.setattr(adversary_points, "adversary_points", lambda certificate: [])
     monkeypatch.setattr(fmu_starts, "on_the_fmus", found)
     assert main(["certify", "bump", "--fmu-starts", "7"]) == 1
     assert asked == [7] and "1.1 of eps" in capsys.readouterr().out

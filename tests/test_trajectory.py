@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from made_up_run import made_up_run
 
 from analysis.errors import InputError
 from analysis.trajectory import (
@@ -267,3 +268,16 @@ def test_the_older_run_stays_where_it_is_if_the_new_one_cannot_take_its_place(
     with pytest.raises(InputError, match="run: the run cannot be put there: no"), new_run_folder(tmp_path / "run"):
         pass
     assert contents(tmp_path) == before
+
+
+def test_a_run_folder_that_holds_more_than_a_run_is_left_alone(tmp_path: Path) -> None:
+    """What somebody put there would be lost with the older run."""
+    target = tmp_path / "run"
+    for _ in range(2):  # the second one replaces the first
+        with new_run_folder(target) as folder:
+            write_run(made_up_run(), folder)
+    (target / "notes.txt").write_text("mine")
+    said = r"run: holds notes\.txt, not of a run; it is left alone"
+    with pytest.raises(InputError, match=said), new_run_folder(target):
+        raise AssertionError("it must be refused before anything is made")
+    assert (target / "notes.txt").read_text() == "mine"

@@ -17,6 +17,7 @@ from ..bertolino_baksa.proof import Proof
 from ..bertolino_baksa.rows_adversary import reached
 from ..bertolino_baksa.rows_certificate import RowsCertificate, certify, to_json
 from ..car import car_form
+from ..errors import InputError
 from ..files import write_whole
 from ..reference import Parameters, car_of
 from .adversary_points import row_points
@@ -39,6 +40,8 @@ def command(parameters: Parameters, road: Path, roads: str, where: Path | None, 
 
     Raises InputError for a file that holds no road, and for an unknown class.
     """
+    if roads == "exact":
+        raise InputError(f"--road-class {roads}: wanted curv:H2 [m/s^2] or lip:H1 [m/s]")
     rows = InputRows(*read_heights(road), road_class(roads))
     gain = infinite_gain(parameters) if closed else None
     print(f"Finding and proving a motion to t = {rows.times[-1]:g} s ...", file=sys.stderr, flush=True)
@@ -49,13 +52,21 @@ def command(parameters: Parameters, road: Path, roads: str, where: Path | None, 
         print(f"no certificate of all these roads: {error}")
         return 1
     points = row_points(certificate)
-    for line in (*lines, *(each.words for each in points)):
+    for line in (*lines, *(each.words for each in points), *_bent(rows)):
         print(line)
     if where is not None:
         write_whole(where, to_json(certificate))
         write_whole(where.with_suffix(".svg"), draw_delta(points))
         print(f"{where}, {where.with_suffix('.svg')}: written")
     return 0
+
+
+def _bent(rows: InputRows) -> list[str]:
+    """Where the rows themselves bend more than their class does between them, which its corners at rows allow."""
+    curves = np.abs(np.diff(rows.slopes, axis=0)).max(axis=1) / (rows.steps[1:] + rows.steps[:-1]) * 2.0
+    if rows.between.kind != "curv" or not (most := float(curves.max(initial=0.0))) > rows.between.bound:
+        return []
+    return [f"  the rows themselves bend by up to {most:.3g} m/s^2: there the roads of this class have corners"]
 
 
 def certify_rows(parameters: Parameters, rows: InputRows, gain: Array | None = None) -> tuple[RowsCertificate, Proof]:

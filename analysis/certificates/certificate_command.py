@@ -25,7 +25,6 @@ from ..files import write_whole
 from ..reference import Parameters, car_of, road_parameters
 from ..scenario import Scenario
 from ..trajectory import CERTIFICATE
-from .adversary_points import adversary_points
 from .car_certificates import build, car_norms, certify_car, prove_reference
 from .certificate_words import model_words, named_by_content, start_words
 from .directed import at_least
@@ -55,6 +54,8 @@ def make_certificate(scenario: Scenario, where: Path | None, *, search: bool = F
         return 1
     for line in lines:
         print(line, flush=True)
+    from .adversary_points import adversary_points
+
     points = adversary_points(certificate)
     for line in (each.words for each in points):
         print(line, flush=True)

@@ -19,8 +19,8 @@ from ..files import write_whole
 from ..findings import Finding
 from ..methods.polynomials import Array
 from ..reference import car_of, road_parameters
-from ..run_figures import DELTA, FOLDER, TUBE
-from ..trajectory import CERTIFICATE, Run
+from ..run_figures import DELTA, TUBE
+from ..trajectory import CERTIFICATE, FIGURES, Run
 from .adversary_points import adversary_points
 from .car_certificates import car_norms, certify_car, linear_motion
 from .certificate_command import statement
@@ -56,14 +56,14 @@ def certify_run(run: Run, folder: Path) -> str:
     for line in statement(certificate, proof):
         print(line)
     figures = {DELTA: draw_delta(adversary_points(certificate))}
-    if off := _too_far(run, certificate):
+    if off := _too_far(run, certificate.claims[0]):
         print(f"  no figure of the tube: {off}")
     else:
         figures[TUBE] = draw_tube(in_tube(run, certificate, proof))
-    (folder / FOLDER).mkdir(exist_ok=True)
-    (folder / FOLDER / TUBE).unlink(missing_ok=True)  # of an earlier run in this folder
+    (folder / FIGURES).mkdir(exist_ok=True)
+    (folder / FIGURES / TUBE).unlink(missing_ok=True)  # of an earlier run in this folder
     for name, image in figures.items():
-        write_whole(folder / FOLDER / name, image)
+        write_whole(folder / FIGURES / name, image)
     write_whole(folder / CERTIFICATE, to_json(certificate))
     return ""
 
@@ -76,11 +76,13 @@ def definition_findings(run: Run, path: Path) -> tuple[list[Finding], str]:
     certificate = from_json(path.read_bytes(), str(path))
     _refuse_another(run, certificate, path)
     certificate = replace(certificate, claims=named_by_content(certificate.claims, car_norms(run.parameters)))
-    if reason := silent(run) or _too_far(run, certificate):
+    if reason := silent(run):
         return [], reason
+    why_not = [_too_far(run, claim) for claim in certificate.claims]
     x = run.trajectory.columns([q.name for q in STATES])
     off = x - linear_motion(run.parameters, run.trajectory.time)
-    return [_stays(claim, x, off, own_error(run)) for claim in certificate.claims], ""
+    within = [claim for claim, reason in zip(certificate.claims, why_not, strict=True) if not reason]
+    return [_stays(claim, x, off, own_error(run)) for claim in within], "; ".join(filter(None, why_not))
 
 
 def _refuse_another(run: Run, certificate: Certificate, path: Path) -> None:
@@ -95,16 +97,13 @@ def _refuse_another(run: Run, certificate: Certificate, path: Path) -> None:
             raise InputError(f"{path}: is of another car or road than run.json: wanted {mine}, got {its}")
 
 
-def _too_far(run: Run, certificate: Certificate) -> str:
-    """Why the certificate does not reach a run's start; "" if it does, in all norms."""
-    x0 = run.trajectory.columns([q.name for q in STATES])[0]
-    for claim in certificate.claims:
-        if not (size := float(claim.norm(x0))) < claim.largest_delta:
-            return (
-                f"the run starts {size:.4g} off x_lin in the {claim.norm.name} norm; wanted less than "
-                f"{at_least(claim.largest_delta)}"
-            )
-    return ""
+def _too_far(run: Run, claim: Claim) -> str:
+    """Why the claim does not reach a run's start; "" if it does."""
+    size = float(claim.norm(run.trajectory.columns([q.name for q in STATES])[0]))
+    if size < claim.largest_delta:
+        return ""
+    wanted = f"wanted less than {at_least(claim.largest_delta)}"
+    return f"the run starts {size:.4g} off x_lin in the {claim.norm.name} norm; {wanted}"
 
 
 def _stays(claim: Claim, x: Array, off: Array, own: float) -> Finding:
@@ -120,7 +119,7 @@ def _stays(claim: Claim, x: Array, off: Array, own: float) -> Finding:
         measured=reached,
         expected=0.0,
         tolerance=epsilon + error,
-        unit={"energy": "J^0.5", "weighted sup": "1"}.get(claim.norm.name, "SI"),
+        unit={"energy": "√J", "weighted sup": "1"}.get(claim.norm.name, "SI"),
         source=f"{CERTIFICATE}; start {start:.4g} off; certified of the exact motion {at_most(epsilon, 6)}, to which "
         f"the run's own error adds up to {error:.2g}",
     )

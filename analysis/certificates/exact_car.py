@@ -94,9 +94,10 @@ def energy_norm(car: Car) -> Norm:
 def norms(car: Car, x_lin: Array) -> tuple[Norm, ...]:
     """The norms of a statement: energy [√J]; each state over its largest value in x_lin (14, …) [1]; Euclid [SI].
 
-    States that (nearly) rest in x_lin are taken over LEAST of what its energy could make of them.
+    States that (nearly) rest in x_lin are taken over LEAST of what its energy could make of them; where all of it
+    rests, an energy of 1 J.
     """
     energy = energy_norm(car)
-    could = np.linalg.norm(np.linalg.inv(energy.T), axis=1) * max(energy(x_lin).max(), 1e-9)
+    could = np.linalg.norm(np.linalg.inv(energy.T), axis=1) * (energy(x_lin).max() or 1.0)
     weights = np.maximum(np.abs(x_lin).max(axis=1), LEAST * could)
     return energy, weighted_sup(weights), euclid(14)

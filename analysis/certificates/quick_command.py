@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import sys
+
 import numpy as np
 
 from ..bertolino_baksa.adversary import long_enough, reference_floor
@@ -17,6 +19,8 @@ from .directed import at_most
 
 def quick_answer(parameters: Parameters) -> int:
     """Print floors from the comparison, and how coarse they are; 0, or 1 if it proves none."""
+    if parameters.get("enabled", True):
+        print("The car is taken without its controller.", file=sys.stderr)
     car, model = car_of(parameters), model_of(parameters)
     form, signal = car_form(car), road_signal(road_parameters(parameters))
     try:

@@ -216,7 +216,7 @@ def _between_rows(run: Run, export: Export, rows: Rows, bound: float, roads: Row
         measured=float(norm((rows.off + rows.e).T).max()),
         expected=0.0,
         tolerance=bound + own,
-        unit="J^0.5",
+        unit="√J",
         source=f"proved on {road} of the exact motion until t = {last:g} s: {at_most(bound, 6)}, of which it reaches "
         f"{seen:.6g} at the rows; the rest of the tolerance, {own:.2g}, is {rest}",
     )

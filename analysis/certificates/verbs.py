@@ -114,7 +114,7 @@ def _certify_run(folder: Path, options: argparse.Namespace) -> int:
     if reason := certify_run(read_run(folder), folder):
         print(f"no certificate: {reason}")
         return 1
-    print(f"{folder / CERTIFICATE}: written; python -m analysis report {folder} shows its figures")
+    print(f"{folder / CERTIFICATE}: written; python -m analysis check {folder} judges the run by it, report shows it")
     return 0
 
 

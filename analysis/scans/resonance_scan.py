@@ -168,10 +168,11 @@ def command(scenario: str, scanned: str | None, out: Path | None) -> int:
     parameters = read_scenario(scenario).parameters
     if scanned is not None:
         variation(scanned)  # refuses an unknown one before anything is computed
+    if out:
+        output_folder(out)  # refuses a file before anything is computed
     table = table_of(parameters)
     print("\n".join(lines(table, parameters)))
     if out:
-        output_folder(out)
         write_whole(out / "resonances.csv", as_csv(_rows(table.rows)))
         print(f"{out / 'resonances.csv'}: written")
     if scanned is None:
