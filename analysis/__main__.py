@@ -13,7 +13,7 @@ from fmu_src.quantities import ParameterError
 
 from .certificates.verbs import add_verbs
 from .errors import CosimError, InputError
-from .scenario import built_in_scenarios, read_scenario
+from .scenario import built_in_scenarios, names_a_folder, read_scenario
 from .trajectory import CERTIFICATE, FINDINGS, RECORD, Run, new_run_folder, read_record, read_run, write_run
 
 
@@ -114,10 +114,10 @@ def _parser() -> argparse.ArgumentParser:
 
 def _spatial(options: argparse.Namespace) -> int:
     _wants_folder(options.out)
-    if (folder := Path(options.scenario)).is_dir():
+    if names_a_folder(options.scenario):
         from .run_energies import command as along
 
-        return along(folder, options.out)
+        return along(Path(options.scenario), options.out)
     from .scans.spatial_scan import command
 
     return command(options.scenario, options.out)

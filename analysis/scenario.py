@@ -81,6 +81,11 @@ def built_in_scenarios() -> list[str]:
     return sorted(path.stem for path in BUILT_IN.glob("*.toml"))
 
 
+def names_a_folder(name_or_path: str) -> bool:
+    """Whether this names a folder, as of a run; a built-in scenario's name is that scenario's: write ./NAME."""
+    return name_or_path not in built_in_scenarios() and Path(name_or_path).is_dir()
+
+
 def read_scenario(name_or_path: str) -> Scenario:
     """A built-in scenario by name, a .toml file, or the run.json of an earlier run.
 

@@ -14,7 +14,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from analysis.errors import InputError
-from analysis.scenario import MAX_STEPS, Scenario, built_in_scenarios, read_scenario
+from analysis.scenario import MAX_STEPS, Scenario, built_in_scenarios, names_a_folder, read_scenario
 from fmu_src.quantities import PARAMETERS, STATES
 
 EVERYTHING = """title = "All that a scenario can hold"
@@ -316,3 +316,13 @@ def test_any_string_is_a_length_or_is_refused(tmp_path_factory: pytest.TempPathF
         assert "\n" not in str(refusal)
     else:
         assert math.isfinite(float(scenario.parameters["A"]))
+
+
+def test_a_built_in_scenario_is_meant_also_where_a_folder_has_its_name(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "bump").mkdir()
+    (tmp_path / "mine").mkdir()
+    assert not names_a_folder("bump") and names_a_folder("./bump") and names_a_folder("mine")
+    assert read_scenario("bump").name == "bump"

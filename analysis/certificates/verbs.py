@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import InputError
-from ..scenario import read_scenario
+from ..scenario import names_a_folder, read_scenario
 from ..trajectory import CERTIFICATE, RECORD, read_run
 
 
@@ -52,8 +52,8 @@ def add_verbs(verbs: Any, scenario: str) -> None:
 
 
 def _certify(options: argparse.Namespace) -> int:
-    if (folder := Path(options.scenario)).is_dir():
-        return _certify_run(folder, options)
+    if names_a_folder(options.scenario):
+        return _certify_run(Path(options.scenario), options)
     if options.out and options.out.suffix == ".svg":
         raise InputError(f"-o {options.out}: wanted a name for the certificate, CERT.json; its figure is CERT.svg")
     if options.out and options.out.is_dir():
