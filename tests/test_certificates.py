@@ -110,6 +110,17 @@ def test_the_largest_delta_is_the_largest_that_the_proof_gives(made: Callable[[]
             assert not any(proof.bounded(claim.norm, delta) for delta in more.tolist())
 
 
+def test_the_rest_on_a_flat_road_is_as_stable_as_a_motion_over_a_bump() -> None:
+    """Its pieces last as long as pieces may, and so many modes' turns; their cells must not."""
+    certificate, proof = certify_car({"profile": "flat"})
+    claim, form = certificate.claims[0], car_form(car_of({}))
+    assert claim.largest_delta > 0.98 * certified(0.01)[0].claims[0].largest_delta
+    delta = np.array([claim.largest_delta / 3.0])
+    found = reached(form, road_signal(road_parameters({"profile": "flat"})), [claim.norm], REST, [delta], 0.5)[0][0]
+    with precision(2):
+        assert found < float(proof.epsilon(claim.norm, delta)[0]) < 1.1 * found
+
+
 # ---------------------------------------------------------------------------------------------------- soundness
 def starts(claim: Any, delta: float, count: int, seed: int) -> Any:
     """Offsets (14, count) on the sphere N = delta, on its corners, and inside."""

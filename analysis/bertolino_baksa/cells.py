@@ -19,6 +19,8 @@ from .pieces import Piece
 from .tube import Outputs, Tube, enclosed_series
 
 CELLS, LATE_CELLS = 12, 3  # per piece, for e^(At) and the growth of perturbations: at first, and from
+MANY = (3, 6, 12, 24, 48, 96)  # numbers of cells
+TURN, LATE_TURN = 0.5, 2.5  # rad that the fastest mode turns over a cell at most, at first, and from LATE on
 LATE = 2.0  # times the slowest time constant on, when what oscillates fast has died out
 PARTS = 4  # of a cell, in whose middles R itself is known
 FINE = 288  # per piece, for the norm of e
@@ -138,8 +140,14 @@ def carried_on(metric: Metric, pieces: Sequence[Piece], start: arb_mat, dropped:
 
 
 def counts(pieces: Sequence[Piece], metric: Metric) -> list[int]:
-    """Number of equal cells of each piece."""
-    return [CELLS if float(p.begin) * metric.alpha < LATE else LATE_CELLS for p in pieces]
+    """Number of equal cells of each piece; more of a long one, as of a motion that rests."""
+    found = []
+    for piece in pieces:
+        late = float(piece.begin) * metric.alpha >= LATE
+        wanted = float(piece.duration) * metric.fastest / (LATE_TURN if late else TURN)
+        at_least = LATE_CELLS if late else CELLS
+        found.append(next((count for count in MANY if count >= max(at_least, wanted)), MANY[-1]))
+    return found
 
 
 def widths(pieces: Sequence[Piece], metric: Metric) -> Array:

@@ -49,6 +49,11 @@ class Metric:
     alpha: float
 
     @cached_property
+    def fastest(self) -> float:
+        """Size of the largest eigenvalue [1/s], about."""
+        return float(np.abs(np.linalg.eigvals(rounded(self.A)[0])).max())
+
+    @cached_property
     def reach(self) -> Array:
         """n_j ≥ |x_j|/‖x‖_S (n,)."""
         return np.sqrt((magnitudes(self.inverse) ** 2).sum(axis=1)) * (1.0 + 1e-14)
