@@ -76,6 +76,8 @@ class Variables(Fmi2Slave):
         self._reals: dict[int, tuple[list[float], int]] = {}  # where the value of each reference lies
         self._reading: dict[tuple[int, ...], Reader] = {}  # lists of references
         self._writing: dict[tuple[int, ...], Writer] = {}  # that have passed
+        self._asked: list[int] = []  # the list that was read last,
+        self._way: Reader = ([], tuple)  # and how
         self._register()
         messages = Messages(self)
         self._messages, self.log_queue = weakref.ref(messages), weakref.proxy(messages)
@@ -108,7 +110,9 @@ class Variables(Fmi2Slave):
         try:
             if self._stale:
                 self._refresh()
-            cells, values = self._reading[(*vrs,)]
+            if vrs != self._asked:  # mostly a host asks for the list of its last call
+                self._way, self._asked = self._reading[(*vrs,)], [*vrs]
+            cells, values = self._way
             return [*values(cells)]
         except KeyError:
             return self._first_reading(vrs)

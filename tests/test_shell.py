@@ -336,12 +336,15 @@ def test_the_state_of_an_instance_that_has_failed_is_refused(load: Loader) -> No
 FALL_DUE = ctypes.PYFUNCTYPE(None, ctypes.py_object)(("PyErr_SetInterrupt", ctypes.pythonapi))
 
 
-def code_of(model: str) -> Any:
-    """The class that the FMUs of this model run, without the one of the slave script."""
+def code_of(host: Host) -> Any:
+    """The class that the host's FMU runs, without the one of the slave script; a process may hold other versions."""
+    model = host.fmu.modelIdentifier
     return next(
         found.__mro__[1]
         for name, module in sys.modules.items()
-        if name.startswith(f"{model.lower()}_") and (found := getattr(module, model, None))
+        if name.startswith(f"{model.lower()}_")
+        and (found := getattr(module, model, None))
+        and found.identity == host.fmu.guid
     )
 
 
@@ -369,7 +372,7 @@ def test_an_interrupt_in_a_step_refuses_it_and_goes_on_to_the_host(
     drive(honest, 0, 10)
     expected = drive(honest, 10, 20)
     with monkeypatch.context() as patch:
-        struck = interrupted(code_of(model), "advance", patch)
+        struck = interrupted(code_of(host), "advance", patch)
         with pytest.raises(KeyboardInterrupt):
             host.step(10 * H, H)
     assert struck
@@ -386,7 +389,7 @@ def test_an_interrupt_in_another_call_is_put_off_until_it_is_complete(
         each.set({"force_fl": 10.0})
     expected = honest.get()
     with monkeypatch.context() as patch:
-        struck = interrupted(code_of("Vehicle7DOF"), method, patch)
+        struck = interrupted(code_of(host), method, patch)
         with pytest.raises(KeyboardInterrupt):
             host.get()
     assert struck and not host.log  # what is no refusal is a warning
@@ -399,7 +402,7 @@ def test_an_interrupted_initialization_is_not_complete_and_can_be_made_anew(
 ) -> None:
     host, honest = load("Vehicle7DOF"), begun(load, "Vehicle7DOF")
     host.set_string(host.reference["road_sampling"], "end")
-    interrupted(code_of("Vehicle7DOF"), "begin", monkeypatch)
+    interrupted(code_of(host), "begin", monkeypatch)
     with pytest.raises(KeyboardInterrupt):
         host.start()
     assert "initialization: KeyboardInterrupt()" in host.log[-1]
@@ -415,7 +418,7 @@ def test_an_interrupt_that_falls_due_when_a_step_is_made_leaves_it_made(
     """As a signal would: when the last of the step's own objects goes, after the last look for interrupts in it."""
     host, honest = begun(load, model), begun(load, model)
     assert drive(host, 0, 10) == drive(honest, 0, 10)
-    plain, due = code_of(model).memory, list[Any]()
+    plain, due = code_of(host).memory, list[Any]()
 
     class Kept(list[Any]):
         pass
@@ -427,7 +430,7 @@ def test_an_interrupt_that_falls_due_when_a_step_is_made_leaves_it_made(
 
     with monkeypatch.context() as patch:
         host.set({name: 1e-3 * np.sin(10 + i) for i, name in enumerate(host.inputs)})
-        patch.setattr(code_of(model), "memory", memory)
+        patch.setattr(code_of(host), "memory", memory)
         with pytest.raises(KeyboardInterrupt):
             host.step(10 * H, H)
     assert due and not host.log
@@ -455,7 +458,7 @@ def test_an_interrupt_at_instantiation_goes_on_to_the_host_and_leaves_a_whole_in
     load: Loader, where: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     honest = begun(load, "Vehicle7DOF")
-    code = code_of("Vehicle7DOF")
+    code = code_of(honest)
     variables = sys.modules[next(c for c in code.__mro__ if c.__name__ == "Variables").__module__]
     with monkeypatch.context() as patch:
         struck = (
