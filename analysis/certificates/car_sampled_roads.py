@@ -24,12 +24,12 @@ from .adversary_points import row_points
 from .car_bounded_roads import flat
 from .car_certificates import build, metric_of
 from .certificate_figures import draw_delta
-from .certificate_words import model_words, named_by_content, refuse_exceeded, start_words
+from .certificate_words import model_words, named_by_content, start_words
 from .closed_loop_certificate import infinite_gain
-from .directed import at_least, at_most
+from .directed import at_most
 from .exact_car import norms
 from .exported import read_heights
-from .motion_words import along
+from .motion_words import along, claim_words
 from .unknown_roads import road_class
 
 
@@ -91,24 +91,16 @@ def statement(certificate: RowsCertificate, proof: Proof) -> list[str]:
     most = reached(form, [claim.norm for claim in claims], rows, certificate.x0)
     start, last = start_words(certificate.x0), float(rows.times[-1])
     assert proof.open is not None
-    lines = [
-        f"x_lin {start} is almost stable (definition 2.1) until t = {last!r} s on every road of class {rows.between} "
-        f"through {len(rows.times)} rows of heights: for every eps >= l,"
-    ]
-    for claim, far in zip(claims, most.tolist(), strict=True):
-        refuse_exceeded(claim, far)
-        epsilon, delta = claim.table[-1].tolist()
-        ratio = f": ratio {claim.floor / far:.3f}" if far else ""
-        lines.append(
-            f"  {claim.norm.name} norm: l <= {at_most(claim.floor, 6)} (roads of the class reach {far:.6g}{ratio}); "
-            f"delta up to {at_least(delta)}, at eps = {at_most(epsilon)}"
-        )
+    which = (
+        f"{start} is almost stable (definition 2.1) on every road of class {rows.between} through "
+        f"{len(rows.times)} rows of heights: for all t until {last!r} s"
+    )
     words = ", ".join(
         f"{q.name} {at_most(v, 3)} {q.unit}"
         for q, v in zip(STATES[:7], proof.open.linear.max(axis=0).tolist(), strict=False)
     )
     return [
-        *lines,
+        *claim_words(claims, most, which, "roads of the class reach"),
         *model_words(model, road=False),
         *along(
             model["parameters"],

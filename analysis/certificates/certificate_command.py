@@ -149,7 +149,7 @@ def statement(certificate: Certificate, proof: Proof) -> list[str]:
     tubes = [(tube, proof.metric) for tube in (proof.tube, *([again.window] if again else []))]
     until = "for all t >= 0" if again else f"until t = {float(proof.tube.pieces[-1].end):g} s"
     return [
-        *claim_words(claims, true, start),
+        *claim_words(claims, true, f"{start} is almost stable (definition 2.1): for all t >= 0"),
         *model_words(model),
         "  every period's tube returns into itself" if again else "  x -> 0 after the road's end",
         *along(model["parameters"], proof.system, tubes, f"{start} itself, {until}"),

@@ -41,7 +41,7 @@ def statement(certificate: SwitchedCertificate, proof: SwitchedProof) -> list[st
     made_for = ", ".join(f"{name} = {number(value)}" for name, value in parameters.items() if name in CONTROL)
     which = f"{len(table.edges) - 1} intervals, {parameters.get(DESIGN.name, DESIGN.start)}"
     return [
-        *claim_words(claims, true, start),
+        *claim_words(claims, true, f"{start} is almost stable (definition 2.1): for all t >= 0"),
         *model_words({"parameters": road})[:-1],
         f"  controlled at every instant from {control.begin:g} to {control.end:g} s, x_lin too, by u = K(t) x [N, SI]",
         f"    K: the file's table ({which}), 0 before and after; that it is optimal for the controller's parameters "

@@ -25,17 +25,21 @@ from .exact_car import exact_car
 Tubes = Sequence[tuple[Tube, Metric]]
 
 
-def claim_words(claims: Sequence[Claim], reached: Array, start: str) -> list[str]:
+def claim_words(
+    claims: Sequence[Claim], reached: Array, which: str, who: str = "a reference motion reaches"
+) -> list[str]:
     """l and the largest δ, each l beside what a reference motion reaches (claims,), nan where there is none.
+
+    which : x_lin it is, that it is almost stable, and for which times.  who : reaches that.
 
     Raises NotProvedError if that exceeds it: no proof says so, but a fault in one would.
     """
-    lines = [f"x_lin {start} is almost stable (definition 2.1): for all t >= 0 and every eps >= l,"]
+    lines = [f"x_lin {which} and every eps >= l,"]
     for claim, floor in zip(claims, reached.tolist(), strict=True):
         epsilon, delta = claim.table[-1].tolist()
         refuse_exceeded(claim, floor)
         ratio = f": ratio {claim.floor / floor:.4f}" if floor else ""
-        beside = "no reference motion" if np.isnan(floor) else f"a reference motion reaches {floor:.6g}{ratio}"
+        beside = "no reference motion" if np.isnan(floor) else f"{who} {floor:.6g}{ratio}"
         lines.append(
             f"  {claim.norm.name} norm: l <= {at_most(claim.floor, 6)} ({beside}); "
             f"delta up to {at_least(delta)}, at eps = {at_most(epsilon)}"
